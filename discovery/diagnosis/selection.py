@@ -14,7 +14,7 @@ from math import inf
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.refit import rescored, score
 from discovery.diagnosis.scan import Scan, attempt, scan_model
-from discovery.diagnosis.scored import Scored, is_usual, light
+from discovery.diagnosis.scored import MOVED, Scored, is_usual, light
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
@@ -236,12 +236,10 @@ class Search:
         scan = self.scanned(current) if current.hypotheses else None
         for h in current.hypotheses if scan else ():
             others = tuple(o for o in current.hypotheses if o.key != h.key)
-            without = self.tried.get(frozenset(o.key for o in others)) or score(
-                self.context, others, current.noise, current.fit, goal=self.goal(current.noise)
-            )
+            without = self._from(current, others)
             if scan is None or without is None:
                 continue
-            own = current.evidence - self.keep(without).evidence
+            own = current.evidence - without.evidence
             # an infinite gain: what is left has a size of the wrong sign, so that nothing is reached
             reached = own if own < inf else -inf
             pool = hopeful(scan.without[h.key], RIVALS, reached)
@@ -250,6 +248,19 @@ class Search:
             if max(best.evidence, without.evidence) > current.evidence:
                 return self._questioned(max(best, without, key=lambda a: a.evidence))
         return current
+
+    def _from(self, current: Scored, fewer: Sequence[Hypothesis]) -> Scored | None:
+        """The model with fewer effects, fitted from where another one stands; None if it does not stay
+        finite. If it is known, its fit may have ended in a minimum that the other one has left.
+        """
+        keys, noise = frozenset(h.key for h in fewer), current.noise
+        known = self.tried.get(keys)
+        goal = self.goal(noise)
+        if known is not None:
+            fit = known.fit
+            goal = min(goal, cost_under(fit.problem, fit.theta, fit.trajectories, noise) - MOVED)
+        found = score(self.context, fewer, noise, current.fit, goal=goal)
+        return self.keep(found) if found is not None else known
 
     def _in_its_place(self, h: Hypothesis, current: Scored) -> list[Score]:
         """Effects that stood in the place of an effect of a model, next to fewer others, and were about as

@@ -131,12 +131,11 @@ def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[
         return fits
     if variable == RATE:
         return [n for n in there if n in scene.largest and _is_flow(scene.channels[n])]
-    is_temperature = variable == INPUT
     return [
         n
         for n in there
         if n in scene.largest
-        and (scene.channels[n].unit in TEMPERATURES) == is_temperature
+        and (variable == INPUT or scene.channels[n].unit not in TEMPERATURES)  # half of 20 degC is no level
         and scene.channels[n].role in effect.roles
         and (not effect.inputs_in or same_dimension(scene.channels[n].unit, effect.inputs_in))
         and (

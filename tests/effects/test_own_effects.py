@@ -27,6 +27,7 @@ from discovery.models import read_model, write_model
 from discovery.printed import printed
 from discovery.progress import silent
 from discovery.report.compare import load_runs
+from discovery.terms import evaluate, names
 from tests import machine
 from tests.machine import CHANNELS, Array, Inputs, model, simulated
 
@@ -180,6 +181,19 @@ def test_an_input_of_a_role_has_to_be_named() -> None:
     with pytest.raises(UserError, match="effect 'rub': say under `roles` which inputs"):
         own(text)
     assert own(text + 'roles = ["heat load"]\n').roles == ("heat load",)
+
+
+def test_an_input_counts_with_its_value_and_a_level_as_its_share() -> None:
+    """As the manual says: `input` is any recorded input of the roles, not only a temperature."""
+    scene = machine.scene(machine.model())
+    speed = next(n for n, channel in CHANNELS.items() if channel.role == "rotation speed")
+    for variable, share in (("input", 1.0), ("level", scene.largest[speed])):
+        text = RUB.replace("k_rub*speed*", f"k_rub*{variable}*") + 'roles = ["rotation speed"]\n'
+        h = candidates(machine.model(), [own(text)], scene)[0]
+        (size,) = h.amplitudes
+        values = {**dict.fromkeys(names(h.terms[0].expression), 0.0), size: 1.0, speed: 600.0}
+        values |= dict.fromkeys(h.shapes, 1.0)
+        assert evaluate(h.terms[0].expression, values).value == pytest.approx(600.0 / share, rel=1e-2)
 
 
 @pytest.mark.parametrize(("place", "search"), [("recording", "step"), ("output of a recording", "step")])

@@ -20,5 +20,6 @@ EFFECT = Effect(
     confused_with=("air_convection", "conduction_path"),
     source="Fourier's law (Incropera, DeWitt, ch. 2); joints and webs of 1 to 100 W/K",
     roles=("temperature", "other input"),
+    inputs_in="degC",
     examples=(Example({"G_in": 10.0, "input": 60.0, "body": 25.0}, 350.0),),
 )

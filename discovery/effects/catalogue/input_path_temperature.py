@@ -21,5 +21,6 @@ EFFECT = Effect(
     confused_with=("second_thermal_mass", "sensor_lag"),
     source="Mayr et al. 2015, eq. (8): an error is a sum of first-order responses to its inputs",
     roles=("ambient temperature", "fluid temperature", "coolant temperature", "temperature", "other input"),
+    inputs_in="degC",
     examples=(Example({"k_path": 3.0, "input": 60.0, "t_path": 600.0}, 75.85, {"input": 20.0}, 600.0),),
 )
