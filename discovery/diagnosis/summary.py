@@ -36,12 +36,13 @@ def lines_of(d: dict[str, Any]) -> list[str]:
         what = f"the missing heat at {about['state']} follows {about['formula']}"
         lines.append(f"  {what} (a description, not a cause)")
     lines += [f"  {one['sentence']}" for one in d.get("responses") or ()]
-    worse, unit, noise = d["improvement"]["contradicted_by"], _unit(d["improvement"]), _noise(d)
-    for run, i in d["improvement"]["held_out"].items() if d["physics"] else ():
+    unit, noise = _unit(d["improvement"]), _noise(d)
+    worse = {_held_out(run) for run in d["improvement"]["contradicted_by"]}
+    for which, i in _runs(d["improvement"]) if d["physics"] else ():
         after = "runs away" if i["rms_after"] is None else printed(i["rms_after"])
         rms = f"rms {printed(i['rms_before'])} -> {after}{unit} ({_by_noise(i, unit, noise)})"
-        rms += ", worse than without" if run in worse else _otherwise(i, unit)
-        lines.append(f"  held-out recording {run}: {rms}")
+        rms += ", worse than without" if which in worse else _otherwise(i, unit)
+        lines.append(f"  {which}: {rms}")
     if not d["physics"]:
         lines += _left(d["improvement"], noise)
     lines.append(f"  next: {d['next_experiment']}")
@@ -70,15 +71,22 @@ def _otherwise(one: dict[str, Any], unit: str) -> str:
 
 def _left(improvement: dict[str, Any], noise: str) -> list[str]:
     """rms of free runs of the model, and the rms that noise explains. `noise`: what it is."""
-    runs = {"recordings to fit": improvement["fit"]} | {
-        f"held-out recording {run}": i for run, i in improvement["held_out"].items()
-    }
     unit = _unit(improvement)
     return [
         f"  {which}: rms {printed(i['rms_before'])}{unit} ({_by_noise(i, unit, noise)}){_by_start(i, unit)}"
-        for which, i in runs.items()
-        if i["rms_before"] is not None
+        for which, i in _runs(improvement)
     ]
+
+
+def _runs(improvement: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+    """Free runs of the model that have an rms, with what they are."""
+    held_out = {_held_out(run): i for run, i in improvement["held_out"].items()}
+    runs = {"recordings to fit": improvement["fit"]} | held_out
+    return [(which, i) for which, i in runs.items() if i["rms_before"] is not None]
+
+
+def _held_out(run: str) -> str:
+    return f"held-out recording {run}"
 
 
 def _by_start(one: dict[str, Any], unit: str) -> str:
@@ -88,7 +96,7 @@ def _by_start(one: dict[str, Any], unit: str) -> str:
     begun, expected = (one.get("from_known_starts") or [None])[0], one.get("expected") or one["noise_floor"]
     if begun is None or one["rms_before"] < _OPEN * max(begun, expected):
         return ""
-    return f"; with start values from all readings, which decide, rms {printed(begun)}{unit}"
+    return f"; with start values from all readings rms {printed(begun)}{unit}, and this one decides"
 
 
 def _by_noise(one: dict[str, Any], unit: str, noise: str) -> str:
@@ -101,7 +109,7 @@ def _by_noise(one: dict[str, Any], unit: str, noise: str) -> str:
     expected = one.get("expected") or floor
     unsure = f", with what the fit leaves open {printed(expected)}{unit}" if expected > _OPEN * floor else ""
     if expected > max(r or 0.0 for r in rms):
-        unsure = ", and the fit leaves open more than the rest" if unsure else ""
+        unsure = "; parameters that the fit leaves open explain the rest" if unsure else ""
     return f"{noise} up to {printed(floor)}{unit}{unsure}"
 
 

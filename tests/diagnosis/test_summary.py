@@ -37,7 +37,7 @@ def test_a_size_stands_with_its_unit_and_a_fixed_switch_is_left_out(tmp_path: Pa
         "alternatives": [],
         "reasons": [],
         "description": None,
-        "improvement": {"held_out": {}, "contradicted_by": []},
+        "improvement": {"fit": {"rms_before": None}, "held_out": {}, "contradicted_by": []},
         "next_experiment": "none",
     }
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
@@ -70,7 +70,12 @@ def test_the_proof_has_a_unit_or_is_in_noises_and_a_jump_that_may_be_none_is_not
         "next_experiment": "none",
     }
     for unit, said in (("K", " K"), ("1", ""), ("times the reading noise", " times the reading noise")):
-        improvement: dict[str, Any] = {"unit": unit, "held_out": held_out, "contradicted_by": []}
+        improvement: dict[str, Any] = {
+            "unit": unit,
+            "fit": {"rms_before": None},
+            "held_out": held_out,
+            "contradicted_by": [],
+        }
         (tmp_path / "diagnosis.json").write_text(
             json.dumps({**document, "improvement": improvement}), "utf-8"
         )
@@ -119,7 +124,7 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     improvement["fit"] = {**left, "expected": 9.87}
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
-    assert line.endswith("4.6 times the reading noise, and the fit leaves open more than the rest)")
+    assert line.endswith("4.6 times the reading noise; parameters that the fit leaves open explain the rest)")
     (tmp_path / "diagnosis.json").write_text(json.dumps(document | {"verdict": "unexplained"}), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
     assert "process noise as large as this model needs explain up to 4.6" in line
@@ -138,6 +143,7 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
 def test_starts_that_turn_the_proof_around_are_said(tmp_path: Path, starts: list[float], said: str) -> None:
     """A hidden body starts unknown: from first readings alone the right repair may look worse."""
     last = {"rms_before": 2.02, "rms_after": 5.94, "noise_floor": 3.18, "from_known_starts": starts}
+    left = {"rms_before": 2.0, "rms_after": 0.4, "noise_floor": 3.0}
     held_out = {"last": last}
     document: dict[str, Any] = {
         "verdict": "missing physics",
@@ -146,12 +152,15 @@ def test_starts_that_turn_the_proof_around_are_said(tmp_path: Path, starts: list
         "alternatives": [],
         "reasons": [],
         "description": None,
-        "improvement": {"unit": "K", "held_out": held_out, "contradicted_by": []},
+        "improvement": {"unit": "K", "fit": left, "held_out": held_out, "contradicted_by": []},
         "next_experiment": "none",
     }
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     noise = "reading noise and heat that nobody records explain up to 3.18 K"
-    assert summary(tmp_path)[2] == f"  held-out recording last: rms 2.02 -> 5.94 K ({noise}){said}"
+    fitted, unseen = summary(tmp_path)[2:4]
+    all_of_it = "reading noise and heat that nobody records explain all of it"
+    assert fitted == f"  recordings to fit: rms 2 -> 0.4 K ({all_of_it})"
+    assert unseen == f"  held-out recording last: rms 2.02 -> 5.94 K ({noise}){said}"
 
 
 @pytest.mark.parametrize(("before", "known"), [(1.24, 0.24), (1.24, 1.2), (0.25, 0.1)])
@@ -177,5 +186,5 @@ def test_a_miss_that_is_how_the_recording_began_is_told_from_one_that_is_not(
     }
     (tmp_path / "diagnosis.json").write_text(json.dumps(document), "utf-8")
     (line,) = summary(tmp_path)[1:-1]
-    told = line.endswith("; with start values from all readings, which decide, rms 0.24 K")
+    told = line.endswith("; with start values from all readings rms 0.24 K, and this one decides")
     assert told == ((before, known) == (1.24, 0.24))
