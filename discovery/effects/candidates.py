@@ -13,7 +13,7 @@ from discovery.effects.hypothesis import BEFORE, Hypothesis
 from discovery.effects.places import TEMPERATURES, Spot, spots
 from discovery.models import Model
 from discovery.models.model import TIME_UNITS
-from discovery.models.units import differences, same_dimension
+from discovery.models.units import differences, dimension, ratio, same_dimension
 from discovery.recordings import Channel
 from discovery.recordings.roles import ROLES
 from discovery.terms import (
@@ -202,6 +202,7 @@ def _claim(
 ) -> Hypothesis:
     channels = (*chosen, *((spot.channel,) if spot.channel else ()))
     effect = _between_two(effect, model, spot, channels, scene)
+    effect = _of_a_power(effect, model, spot, channels, scene)
     naming = _naming(effect, model, spot, run, channels, binding, scene)
     terms, shown = _changes(effect, model, spot, naming, scene)
     acting = () if run is None else (run,) if effect.is_event else scene.after[run]
@@ -235,6 +236,18 @@ def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, 
     rate = sum(1 / (model.states[b].capacity or unit) for b in spot.bodies[: 1 if heats else None])
     constants = 1.0 if heats else GONE
     most = min(effect.amplitude.most, constants / (rate * scene.spacing))
+    return replace(effect, amplitude=replace(effect.amplitude, most=most))
+
+
+def _of_a_power(effect: Effect, model: Model, spot: Spot, channels: tuple[str, ...], scene: Scene) -> Effect:
+    """Heat that follows a recorded power, no more of it than the largest power: energy is not made."""
+    if effect.group != "inputs" or effect.amplitude.unit != "W" or len(channels) != 1:
+        return effect
+    watts, of = dimension("W"), dimension(scene.channels[channels[0]].unit)
+    factor = ratio(of, watts) if of and watts else None
+    if factor is None or not all(model.states[body].capacity for body in spot.bodies):
+        return effect
+    most = min(effect.amplitude.most, factor * scene.largest[channels[0]])
     return replace(effect, amplitude=replace(effect.amplitude, most=most))
 
 

@@ -44,7 +44,7 @@ Place = Literal[
     "output that is a temperature",  # where an error would count from a zero of its own
     "input temperature",  # one recorded temperature, wherever the model uses it
     "inputs of a recording",  # every input in one recording
-    "recording",  # all errors of one recording
+    "recording",  # all errors of one recording, which a device shows: no thermometer is set to zero
 ]
 TERM_PLACES = (
     "fluid terms",

@@ -92,7 +92,7 @@ def spots(
             yield from (Spot((a, b)) for a in _driven(effect, parts) for b in parts.bodies if a != b)
         case "current terms":
             currents = {n for n, c in channels.items() if same_dimension(c.unit, "A")}
-            yield from _of(effect, tuple(t for t in parts.own if names(t.expression) & currents))
+            yield from _of(tuple(t for t in parts.own if names(t.expression) & currents))
         case (
             "fluid terms" | "coolant terms" | "cooling terms" | "loss terms" | "air terms" | "heat of a body"
         ):
@@ -118,8 +118,8 @@ def spots(
             terms = tuple(t for t in parts.own if names(t.expression) & set(channels) - set(model.states))
             if terms:
                 yield Spot(terms=terms)
-        case "recording" if len(outputs) > 1:
-            yield Spot(outputs=outputs)
+        case "recording":
+            yield from _of_a_device(outputs, channels)
 
 
 def _single_outputs(
@@ -143,6 +143,13 @@ def _single_outputs(
         case "output that is no temperature":
             return tuple(n for n in outputs if not same_dimension(channels[n].unit, "degC"))
     return outputs
+
+
+def _of_a_device(outputs: tuple[str, ...], channels: Mapping[str, Channel]) -> Iterator[Spot]:
+    """All errors together, which one device shows."""
+    errors = tuple(y for y in outputs if not same_dimension(channels[y].unit, "degC"))
+    if len(errors) > 1:
+        yield Spot(outputs=errors)
 
 
 def _bodies(effect: Effect, parts: Layout) -> tuple[str, ...] | None:
@@ -191,7 +198,7 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         "air terms": "ambient temperature",
     }[effect.place]
     every = tuple(t for t in parts.own if _holds(t, wanted, role))
-    yield from _of(effect, _heats(model, parts, role) if wanted == "heat load" else every)
+    yield from _of(_heats(model, parts, role) if wanted == "heat load" else every)
 
 
 def _heats(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, ...]:
@@ -204,15 +211,14 @@ def _between(parts: Layout, a: str, b: str) -> tuple[Term, ...]:
     return tuple(t for t in parts.own if t.source and {t.into, t.source} == {a, b})
 
 
-def _of(effect: Effect, terms: tuple[Term, ...]) -> Iterator[Spot]:
-    """All of some terms, and those of each body alone, where a term itself is what changes, or what a coolant
-    is there: it flows through one body after the other, and a cutting fluid over all of them.
+def _of(terms: tuple[Term, ...]) -> Iterator[Spot]:
+    """All of some terms, and those of each body alone: the air, a fluid or a loss at one body need not be as
+    elsewhere.
     """
     bodies = tuple(dict.fromkeys(t.into for t in terms))
     if terms:
         yield Spot(bodies, terms)
-    each = TERM in names(parse(effect.formula)) or effect.place == "coolant terms"
-    if each and len(bodies) > 1:
+    if len(bodies) > 1:
         yield from (Spot((b,), tuple(t for t in terms if t.into == b)) for b in bodies)
 
 

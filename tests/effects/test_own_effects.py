@@ -57,8 +57,9 @@ def test_a_formula_may_replace_the_channel_of_its_place() -> None:
     enclosure = RUB.replace("driven body", "air terms").replace('"W/rpm"', '"1"')
     late = "ambient + k_rub*(lag(ambient, t_free) - ambient)"
     effect = own(enclosure.replace("k_rub*speed*exp(-time/t_free)", late))
-    (h,) = candidates(machine.model(), [effect], machine.scene(machine.model()))
-    assert {t.into for t in h.terms} == {"motor", "bed"}
+    everywhere, *each = candidates(machine.model(), [effect], machine.scene(machine.model()))
+    assert {t.into for t in everywhere.terms} == {"motor", "bed"}
+    assert [{t.into for t in h.terms} for h in each] == [{"motor"}, {"bed"}]
     with pytest.raises(UserError, match=r"at the place 'air terms' its formula needs `term`"):
         own(enclosure.replace("exp(-time/t_free)", "exp(-time/t_free) + 0*speed"))
 

@@ -3,7 +3,7 @@
     t_air T_air' = T_env - T_air;  T_air replaces T_env in every term of the air in the model
 
 t_air in s: 10 min to 2 h. Source: heat balance of an enclosure: sheet metal, fixtures and air of 50 to 200
-kJ/K behind 20 to 100 W/K. Limits: the same for all bodies; settled at the first instant; heat of the machine
+kJ/K behind 20 to 100 W/K. Limits: at all bodies or at one; settled at the first instant; heat of the machine
 that warms this air is not part of it.
 """
 

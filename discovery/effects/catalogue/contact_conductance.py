@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="air and structure",
     place="link",
     formula="p_joint*((body + other)/2 - ambient)/10*term",
-    amplitude=Amplitude("p_joint", "1", 0.2, 0, most=0.5),
+    amplitude=Amplitude("p_joint", "1", 0.2, 0, most=2.0),
     signature="a link between bodies gets better or worse as they warm up",
     confused_with=("natural_convection",),
     source="joint conductance changes with contact pressure: 10 to 30 % between cold and warm",

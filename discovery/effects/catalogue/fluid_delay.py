@@ -3,7 +3,7 @@
     T_fluid(t) in every wet term of the model becomes T_fluid(t - t_delay)
 
 t_delay in s: 5 to 50 s for the hose alone, minutes where the fluid reaches the bodies through channels,
-5 min to 1 h where a tank lies between. Source: plug flow. Limits: the same for all bodies; mixing on the way
+5 min to 1 h where a tank lies between. Source: plug flow. Limits: at all bodies or at one; mixing on the way
 is `fluid_sump`.
 """
 
