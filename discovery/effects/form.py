@@ -28,7 +28,7 @@ Place = Literal[
     "coolant terms",  # terms in which the coolant temperature stands
     "cooling terms",  # terms in which the cooling power stands
     "current terms",  # terms in which an electric current stands
-    "loss terms",  # terms in which a heat load stands, or a law of the speed or another input
+    "loss terms",  # at each body laws of the speed, or else terms of a heat load or another input
     "air terms",  # terms in which the ambient temperature stands
     "heat of a body",  # the loss terms that enter one body
     "error state",  # a state that is an error: its terms are rates

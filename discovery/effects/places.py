@@ -198,7 +198,16 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         "air terms": "ambient temperature",
     }[effect.place]
     every = tuple(t for t in parts.own if _holds(t, wanted, role))
-    yield from _of(_heats(model, parts, role) if wanted == "heat load" else every)
+    yield from _of(_losses(model, parts, role) if wanted == "heat load" else every)
+
+
+def _losses(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, ...]:
+    """Terms that may be friction. At a body where a law of the speed is, what heats it next to that is
+    something else: a heater, or the copper of a motor.
+    """
+    heats = _heats(model, parts, role)
+    rubbed = {t.into for t in heats if _is_friction(t, model, role)}
+    return tuple(t for t in heats if t.into not in rubbed or _is_friction(t, model, role))
 
 
 def _heats(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, ...]:

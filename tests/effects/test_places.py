@@ -196,6 +196,15 @@ def test_what_holds_a_temperature_is_an_exchange_and_no_friction(law: str, frict
     assert (("bed",) in found) == friction
 
 
+def test_a_heater_next_to_friction_does_not_age() -> None:
+    """An extruder: oil that thins out was tried on its heater as well, and moved air was named."""
+    model, channels = sample()
+    model = replace(model, terms=(*model.terms, Term("heater", "table", parse("loss*drive"))))
+    for word in ("wear", "viscosity_friction"):
+        alone = [h for h in claims(model, catalogue()[word], channels) if h.states == ("table",)]
+        assert {t.name.split(": ")[1] for h in alone for t in h.terms} == {"bearing"}
+
+
 def test_losses_age_all_together_or_at_one_body() -> None:
     """Whatever their law, from the second recording on: what is common to all is the model's own gain."""
     found = expand(catalogue()["wear"])

@@ -2,8 +2,8 @@
 
     q = G_gap s (T_other - T)    [W] into one body and out of the other
 
-s is 1 while fluid flows and 0 while it does not. G_gap in W/K, 10 to 100. Source: as `flooded_gap`: conduction
-through a film of 1 mm. Limits: fills and drains within a step of the readings.
+s is 1 while fluid flows and 0 while it does not. G_gap in W/K, 10 to 100. Source: as `flooded_gap`,
+conduction through a film of 1 mm. Limits: fills and drains within a step of the readings.
 """
 
 from dataclasses import replace
