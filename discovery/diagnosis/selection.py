@@ -260,7 +260,9 @@ class Search:
             fit = known.fit
             goal = min(goal, cost_under(fit.problem, fit.theta, fit.trajectories, noise) - MOVED)
         found = score(self.context, fewer, noise, current.fit, goal=goal)
-        return self.keep(found) if found is not None else known
+        if found is not None:
+            self.keep(found)
+        return self.tried.get(keys)
 
     def _in_its_place(self, h: Hypothesis, current: Scored) -> list[Score]:
         """Effects that stood in the place of an effect of a model, next to fewer others, and were about as

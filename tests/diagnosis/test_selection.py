@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from discovery.diagnosis import selection
-from discovery.diagnosis.scored import Scored
+from discovery.diagnosis.scored import MOVED, Scored
 from discovery.diagnosis.selection import FAR, Search, look_alikes, not_twice
 from discovery.effects.catalogue import catalogue
 from discovery.evidence.bayes import Score
@@ -170,3 +170,35 @@ def test_a_fit_that_ended_early_says_nothing_of_what_is_as_likely(
         found.tried[one.keys] = one
     monkeypatch.setattr(selection, "_of_model", lambda h, _: h)
     assert [cast(Any, h).key for h in found._in_its_place(answer.hypotheses[0], answer)] == asked
+
+
+@pytest.mark.parametrize(("again", "kept"), [(80.0, 80.0), (40.0, 50.0), (None, 50.0)])
+def test_a_model_without_an_effect_is_fitted_from_where_the_other_stands(
+    again: float | None, kept: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A processor: with a clock that was shifted by 0.008 s the fit left a bad minimum, 23 units better, and
+    the model without it kept the score of that minimum.
+    """
+    drift = cast(Any, SimpleNamespace(key="drift"))
+
+    def model(evidence: float) -> Any:
+        fit = SimpleNamespace(problem=None, theta=None, trajectories=())
+        return SimpleNamespace(hypotheses=(drift,), keys=frozenset({"drift"}), evidence=evidence, fit=fit)
+
+    found = Search(dry())
+    found.tried[frozenset({cast(Any, "drift")})] = model(50.0)
+    goals: list[float] = []
+
+    def refit(*_: object, goal: float) -> Any:
+        goals.append(goal)
+        return None if again is None else model(again)
+
+    monkeypatch.setattr(selection, "score", refit)
+    monkeypatch.setattr(selection, "light", lambda one: one)
+    monkeypatch.setattr(selection, "cost_under", lambda *_: 7.0)
+    monkeypatch.setattr(Search, "goal", lambda _, _noise: 100.0)
+    current = cast(Scored, SimpleNamespace(noise=None, fit=None))
+    without = found._from(current, [drift])
+    assert without is not None
+    assert without.evidence == kept
+    assert goals == [7.0 - MOVED]  # it ends where it does not come below what is known

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
-from discovery.dynamics import System, make_grid, make_system, predict, simulate
+from discovery.dynamics import System, kernel, make_grid, make_system, predict, simulate
 from discovery.models import Model, Parameter, State
 from discovery.models.thermobalance import thermobalance
 from discovery.recordings import Campaign, Channel, Recording
@@ -246,3 +247,28 @@ def test_72_hours_with_200_columns_take_less_than_a_fifth_of_a_second() -> None:
         sensitivities(simulate(system, model.values()), (), (), candidates)
         taken.append(clock.perf_counter() - began)
     assert min(taken[1:]) < 0.2
+
+
+def test_exponentials_side_by_side_are_those_of_scipy() -> None:
+    """Many intervals, of norms that need from none to ten halvings, some alone with theirs; one is no number.
+
+    The forcing of an interval runs straight: exp of the block matrix has phi1 and phi2 next to it (Van Loan).
+    """
+    rng = np.random.default_rng(5)
+    n, count = 4, 90
+    a = rng.normal(size=(count, n, n)) * 10 ** rng.uniform(-4, 0.3, size=(count, 1, 1))
+    h = rng.choice([10.0, 60.0], count)
+    a[7] = np.nan
+    which, e, w0, w1 = kernel.transitions(a, h)
+    assert which.tolist() == list(range(count))
+    assert np.isnan(e[7]).all()
+    for k in set(range(count)) - {7}:
+        block = np.zeros((3 * n, 3 * n))
+        block[:n, :n], block[:n, n : 2 * n] = a[k] * h[k], np.eye(n)
+        block[n : 2 * n, 2 * n :] = np.eye(n)
+        whole = expm(block)
+        phi1, phi2 = whole[:n, n : 2 * n], whole[:n, 2 * n :]
+        size = np.abs(whole[:n]).max()
+        np.testing.assert_allclose(e[k], whole[:n, :n], rtol=0, atol=1e-9 * size)
+        np.testing.assert_allclose(w1[k], h[k] * phi2, rtol=0, atol=1e-9 * h[k] * size)
+        np.testing.assert_allclose(w0[k], h[k] * (phi1 - phi2), rtol=0, atol=1e-9 * h[k] * size)

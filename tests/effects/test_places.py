@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import exp, log
+from math import exp, inf, log
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,18 @@ from discovery.effects.form import TERM_PLACES
 from discovery.models import Model, read_model, write_model
 from discovery.recordings import Channel
 from discovery.terms import Term, evaluate, names, parse, substitute
-from tests.effects.sample import EVENT_ODDS, ODDS, READ, claims, expand, inside, sample, scene, trajectory
+from tests.effects.sample import (
+    EVENT_ODDS,
+    HIGH,
+    ODDS,
+    READ,
+    claims,
+    expand,
+    inside,
+    sample,
+    scene,
+    trajectory,
+)
 
 DRIVEN = ("viscosity_temperature", "thermal_preload", "windage")
 REPLACING = (*TERM_PLACES, "inputs of a recording")
@@ -194,6 +205,31 @@ def test_what_holds_a_temperature_is_an_exchange_and_no_friction(law: str, frict
     model = replace(model, terms=(*model.terms, Term("law", "bed", parse(law))))
     found = {h.states for h in claims(model, catalogue()["windage"], channels)}
     assert (("bed",) in found) == friction
+
+
+def test_air_and_fluid_may_be_late_at_one_body() -> None:
+    """A measuring machine: air that was late at its bridge had been late at all of its bodies."""
+    model, channels = sample()
+    model = replace(model, terms=(*model.terms, Term("air too", "motor", parse("hA*(room - motor)"))))
+    found = {h.states for h in claims(model, catalogue()["air_lag"], channels)}
+    assert found == {("bed", "motor"), ("bed",), ("motor",)}
+
+
+def test_heat_that_follows_a_power_is_no_more_than_it() -> None:
+    """An extruder: 114 kW from a heater of 0.9 kW. Of a body without a capacity nobody knows the watts."""
+    model, channels = sample()
+    found = {h.states: h for h in claims(model, catalogue()["input_heat_load"], channels)}
+    assert found["bed",].effect.amplitude.most == HIGH["drive"]
+    rates = {name: replace(state, capacity=None) for name, state in model.states.items()}
+    found = {
+        h.states: h for h in claims(replace(model, states=rates), catalogue()["input_heat_load"], channels)
+    }
+    assert found["bed",].effect.amplitude.most == inf
+
+
+def test_no_thermometer_is_set_to_zero() -> None:
+    (h, *_) = expand(catalogue()["rezero"])
+    assert set(h.shown) == {"E_Y", "E_Z"}
 
 
 def test_a_heater_next_to_friction_does_not_age() -> None:
