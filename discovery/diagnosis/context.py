@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,7 @@ class Context:
     baseline: Fit
     settings: Settings
     floor: Mapping[str, float]  # of the process noise of each state at level one
-    belief: float | None
+    belief: float  # log of the factor within which its start values are known
     outliers: tuple[Outlier, ...]  # set aside
     form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
     kinds: tuple[int, int, int, int]  # of these: of laws, places, zeros of thermometers, air at bodies
@@ -121,7 +122,8 @@ def make_context(
     """
     inputs = recorded_inputs(campaign, recordings, outputs)
     whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
-    belief = None if model.guessed else thresholds.BELIEF
+    # a guess may be as far off as usual sizes lie apart: without any belief a capacity of 100 J/K became 1e8
+    belief = 2 * log(thresholds.FACTOR) if model.guessed else thresholds.BELIEF
     stated = {name: campaign.channels[name].noise for name in outputs}
 
     def fitted(grids: Mapping[str, Grid], begin: Fit | None = None) -> Fit:

@@ -75,7 +75,7 @@ class Model:
     terms: tuple[Term, ...]
     outputs: Mapping[str, Expression]
     time_unit: str = "s"
-    guessed: bool = False  # the start values are where a fit begins, not what somebody knows
+    guessed: bool = False  # the start values are guesses, not what somebody knows
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -98,8 +98,8 @@ class ModelForm(Strict):
     time_unit: Literal["s", "min", "h", "d"] = "s"
     guessed: bool = Field(
         False,
-        description="true: the start values are guesses, and a diagnosis does not believe them (written by "
-        "`discovery new`)",
+        description="true: the start values are guesses, and a diagnosis believes them within a factor of "
+        "nine (written by `discovery new`)",
     )
     parameters: dict[str, ParameterForm] = Field(default_factory=dict)
     states: dict[str, StateForm]

@@ -1,13 +1,15 @@
-"""Start values that are guesses are where a fit begins; a diagnosis does not hold on to them."""
+"""Start values that are guesses: a diagnosis hardly holds on to them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from discovery.models import Model, read_model, write_model
+from discovery.models import Model, Parameter, read_model, write_model
 from tests.diagnosis.parts import context_of
 from tests.machine import campaign, model, simulated
 
@@ -19,16 +21,25 @@ def far_off(guessed: bool) -> Model:
     return replace(whole, parameters=sizes, guessed=guessed)
 
 
-def test_guesses_are_not_believed() -> None:
+def test_guesses_are_hardly_believed() -> None:
     runs = campaign(simulated(1))
     near, guessed, believed = (
         context_of(runs, one).baseline.model.parameters
         for one in (replace(model(), guessed=True), far_off(True), far_off(False))
     )
     for name, p in near.items():
-        assert guessed[name].value == pytest.approx(p.value, rel=1e-6), name
-    pulled = [name for name, p in near.items() if believed[name].value != pytest.approx(p.value, rel=1e-4)]
-    assert pulled
+        assert guessed[name].value == pytest.approx(p.value, rel=1e-3), name
+
+    def pulled(one: Mapping[str, Parameter]) -> float:
+        return sum(abs(float(np.log(one[name].value / p.value))) for name, p in near.items())
+
+    assert pulled(believed) > 4 * pulled(guessed)
+
+
+def test_a_guess_keeps_what_the_readings_leave_open() -> None:
+    """A processor: nothing spoke against a sink of 1e8 J/K, guessed as 100, but for the start value."""
+    width = context_of(campaign(simulated(1)), replace(model(), guessed=True)).belief
+    assert np.exp(width) == pytest.approx(9.0)
 
 
 def test_a_file_says_so(tmp_path: Path) -> None:
