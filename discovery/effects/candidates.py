@@ -32,6 +32,7 @@ from discovery.terms import (
 
 MEDIA = ("fluid", "coolant")  # whose exchange an input changes; without one, it is that with the air
 GONE = 3.0  # time constants after which less than a twentieth of a difference is left
+CAPACITIES = 3.0  # factor within which capacities are known: so much more than a power it may seem to heat
 
 
 @dataclass(frozen=True)
@@ -240,14 +241,14 @@ def _between_two(effect: Effect, model: Model, spot: Spot, channels: tuple[str, 
 
 
 def _of_a_power(effect: Effect, model: Model, spot: Spot, channels: tuple[str, ...], scene: Scene) -> Effect:
-    """Heat that follows a recorded power, no more of it than the largest power: energy is not made."""
+    """Heat that follows a recorded power, no more of it than the power gives: energy is not made."""
     if effect.group != "inputs" or effect.amplitude.unit != "W" or len(channels) != 1:
         return effect
     watts, of = dimension("W"), dimension(scene.channels[channels[0]].unit)
     factor = ratio(of, watts) if of and watts else None
     if factor is None or not all(model.states[body].capacity for body in spot.bodies):
         return effect
-    most = min(effect.amplitude.most, factor * scene.largest[channels[0]])
+    most = min(effect.amplitude.most, CAPACITIES * factor * scene.largest[channels[0]])
     return replace(effect, amplitude=replace(effect.amplitude, most=most))
 
 
