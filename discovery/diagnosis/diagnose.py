@@ -160,7 +160,7 @@ def diagnose(
     """Find the physics that a model leaves out; `docs/mismatch.md` describes the method.
 
     Args:
-        model: the model to diagnose; its start values are beliefs of its author, unless they are `guessed`.
+        model: the model to diagnose; its start values are believed, `guessed` ones hardly.
         fit: recordings for fits and searches.
         held_out: recordings for the proof; nothing else uses them.
         outputs: measured channels; default all that model and campaign share.
