@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from math import log
 
-from discovery.effects.form import INPUT, LEVEL, RATE, REPLACED, ROLE_OF, TERM, Effect
+from discovery.effects.form import INPUT, LEVEL, OF_INPUTS, RATE, REPLACED, ROLE_OF, TERM, Effect
 from discovery.effects.hypothesis import BEFORE, Hypothesis
 from discovery.effects.places import TEMPERATURES, Spot, spots
 from discovery.models import Model
@@ -93,7 +93,7 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
     if any(scene.channels[name].role in effect.unless for name in scene.largest):
         return
     used = names(parse(effect.formula, f"effect {effect.word}"))
-    any_input = () if effect.place in ("input temperature", "inputs of a recording") else (INPUT, LEVEL, RATE)
+    any_input = () if effect.place in OF_INPUTS else (INPUT, LEVEL, RATE)
     wanted = [variable for variable in (*ROLE_OF, *any_input) if variable in used]
     choices = [_choices(variable, effect, model, scene) for variable in wanted]
     own = (INPUT, LEVEL, *(MEDIA if effect.group == "inputs" else ()))

@@ -43,6 +43,7 @@ Place = Literal[
     "output next to others",  # one output of several
     "output that is a temperature",  # where an error would count from a zero of its own
     "input temperature",  # one recorded temperature, wherever the model uses it
+    "driving input",  # one recorded input that is none, wherever the model uses it
     "inputs of a recording",  # every input in one recording
     "recording",  # all errors of one recording, which a device shows: no thermometer is set to zero
 ]
@@ -55,7 +56,10 @@ TERM_PLACES = (
     "heat of a body",
     "air terms",
     "input temperature",
+    "driving input",
 )
+
+OF_INPUTS = ("input temperature", "driving input", "inputs of a recording")  # which are replaced themselves
 
 # what a formula without `term` replaces in the terms of its place: the first of these that it names
 REPLACED = ("fluid", "coolant", "ambient", "cooling", "load", "flow")

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, model_validator
 from discovery.effects.form import (
     INPUT,
     LEVEL,
+    OF_INPUTS,
     RATE,
     REPLACED,
     ROLE_OF,
@@ -31,14 +32,10 @@ from discovery.schema import Strict
 from discovery.terms import Expression, degree, evaluate, names, parse
 from discovery.terms.expression import rewrite
 
-_OF_INPUTS: tuple[Place, ...] = (
-    "input temperature",
-    "inputs of a recording",
-)  # which are replaced themselves
-# places of effects by how many instants are searched for: a jump, or heat for some hours
+# places of effects by how many instants are searched for: a jump, or some hours
 _SEARCHED: dict[int, tuple[Place, ...]] = {
     1: ("output of a recording", "recording"),
-    2: ("body", "fluid-free body", "wet body", "driven body", "air body"),
+    2: ("body", "fluid-free body", "wet body", "driven body", "air body", "driving input"),
 }
 
 
@@ -143,8 +140,8 @@ class EffectForm(Strict):
         of_one = bool(instants) or self.place.endswith("recording")
         if instants and self.place not in _SEARCHED.get(instants, ()):
             raise UserError(
-                f"{where}: one instant is when an output jumps, two are when heat at a body begins and ends; "
-                f"with {instants} it cannot act at the place '{self.place}'"
+                f"{where}: one instant is when an output jumps, two are when something begins and ends at a "
+                f"body or an input; with {instants} it cannot act at the place '{self.place}'"
             )
         given = {s.name: Parameter(s.middle or 1.0, s.unit, s.ends[0], per_recording=of_one) for s in shapes}
         check_memory(formula, given, ("body", "other", "y"), where)
@@ -177,14 +174,14 @@ class EffectForm(Strict):
             )
         if self.amplitude not in used:
             raise UserError(f"{where}: the amplitude '{self.amplitude}' is not in the formula")
-        at_terms = self.place in (*TERM_PLACES, *_OF_INPUTS)
+        at_terms = self.place in (*TERM_PLACES, *OF_INPUTS)
         replaces = at_terms and TERM not in used  # then it is what a channel becomes, no change
         if not replaces and not _is_a_factor(self.amplitude, formula):
             raise UserError(
                 f"{where}: its formula has to be zero where {self.amplitude} is zero, and linear in it; "
                 f"write it as {self.amplitude}*(...)"
             )
-        if replaces and self.place not in _OF_INPUTS and used.isdisjoint(REPLACED):
+        if replaces and self.place not in OF_INPUTS and used.isdisjoint(REPLACED):
             raise UserError(
                 f"{where}: at the place '{self.place}' its formula needs `{TERM}`, the term that changes, or "
                 f"the channel that it replaces there: {', '.join(REPLACED)}"

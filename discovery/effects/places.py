@@ -97,8 +97,8 @@ def spots(
             "fluid terms" | "coolant terms" | "cooling terms" | "loss terms" | "air terms" | "heat of a body"
         ):
             yield from _of_terms(effect, model, parts, role)
-        case "input temperature":
-            yield from _of_inputs(model, parts, channels)
+        case "input temperature" | "driving input":
+            yield from _of_inputs(effect, model, parts, channels)
         case "error state":
             yield from (Spot((name,)) for name in parts.errors)
         case place if place.startswith("output"):
@@ -231,11 +231,14 @@ def _of(terms: tuple[Term, ...]) -> Iterator[Spot]:
         yield from (Spot((b,), tuple(t for t in terms if t.into == b)) for b in bodies)
 
 
-def _of_inputs(model: Model, parts: Layout, channels: Mapping[str, Channel]) -> Iterator[Spot]:
-    """Each recorded temperature with the terms that it drives."""
+def _of_inputs(
+    effect: Effect, model: Model, parts: Layout, channels: Mapping[str, Channel]
+) -> Iterator[Spot]:
+    """Each recorded temperature, or each other input, with the terms that it drives."""
+    warm = effect.place == "input temperature"
     for name, channel in channels.items():
         terms = tuple(t for t in parts.own if name in names(t.expression))
-        if terms and name not in model.states and channel.unit in TEMPERATURES:
+        if terms and name not in model.states and (channel.unit in TEMPERATURES) == warm:
             yield Spot(terms=terms, channel=name)
 
 

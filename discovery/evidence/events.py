@@ -1,4 +1,4 @@
-"""The search for events: when an unknown heat acts, and when a sensor jumps.
+"""The search for events: when an unknown heat or draught acts, and when a sensor jumps.
 
 Steps at many instants are filtered through the model at once. A window is the difference of two steps, so one
 Gram matrix scores all windows of a recording. All instants are equally likely in the prior. The weight of the
@@ -18,6 +18,7 @@ from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, project_one
 from discovery.evidence.outliers import MOST
 from discovery.evidence.settings import Setting
+from discovery.evidence.signatures import Claims
 from discovery.evidence.whitening import Whitened, log_sum_exp
 from discovery.threads import side_by_side
 
@@ -67,7 +68,6 @@ class _Search:
         self.trajectory = seen.fit.trajectories[self.index]
         grid = self.trajectory.system.grid
         self.read = grid.time[grid.read]
-        self.known: dict[str, Projected] = {}
         self.jumps: dict[str, tuple[Array, Array]] = {}
 
     def projected(self, columns: Array) -> Projected:
@@ -85,12 +85,9 @@ class _Search:
         return self._close_window(h, slab) if h.effect.search == "window" else h
 
     def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
-        """Heat at a body between two instants; it may begin before the recording and end after it."""
+        """An effect between two instants; it may begin before the recording and end after it."""
         coarse = self._coarse()
-        body = h.states[0]
-        if body not in self.known:
-            self.known[body] = self.projected(heat_steps(self.trajectory, body, coarse))
-        gains = self._allowed(self._of_windows(self.known[body], slab), coarse)
+        gains = self._allowed(self._windows(h, coarse, slab), coarse)
         possible = int(np.isfinite(gains).sum())
         if not possible:
             return None
@@ -101,11 +98,11 @@ class _Search:
 
     def _close_window(self, h: Hypothesis, slab: Slab) -> Hypothesis:
         coarse = self._coarse()
-        width, body = float(coarse[1] - coarse[0]), h.states[0]
+        width = float(coarse[1] - coarse[0])
         begin, end = h.shapes
 
         def gains(instants: Array) -> Array:
-            return self._allowed(self._windows(body, instants, slab), instants)
+            return self._allowed(self._windows(h, instants, slab), instants)
 
         near = _around(h.shapes[begin], h.shapes[end], width, coarse[0], coarse[-1])
         found = gains(near)
@@ -131,12 +128,9 @@ class _Search:
         gains[np.minimum(inside, np.minimum(first, last)) < LEAST] = -np.inf
         return gains
 
-    def _windows(self, body: str, instants: Array, slab: Slab) -> Array:
-        return self._of_windows(self.projected(heat_steps(self.trajectory, body, instants)), slab)
-
-    def _of_windows(self, part: Projected, slab: Slab) -> Array:
-        """Log Bayes factor of heat between each two instants."""
-        count = len(part.dot)
+    def _windows(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
+        """Log Bayes factor of an effect between each two instants."""
+        part, count = self.projected(event_steps(self.trajectory, h, instants)), len(instants)
         matrix = part.block(range(count))
         diagonal = np.diag(matrix)
         gram = np.maximum(diagonal[:, None] + diagonal[None, :] - 2 * matrix, 1e-30)
@@ -188,14 +182,34 @@ def _log_bayes(dot: Array, gram: Array, slab: Slab) -> Array:
     return np.asarray(0.5 * dot**2 / gram + slab.average(mean, variance) + 0.5 * np.log(2 * np.pi * variance))
 
 
+def event_steps(trajectory: Trajectory, h: Hypothesis, instants: Array) -> Array:
+    """Response (R, Y, M) to a unit of an effect between two instants that acts from each instant on."""
+    begin, end = h.shapes
+    whole = Claims.of([h.at({begin: -np.inf, end: np.inf})], trajectory.system.model)
+    entering, showing = whole.along(trajectory)
+    out = _from_each(trajectory, entering, instants)
+    grid = trajectory.system.grid
+    for _, y, series in showing:
+        out[:, y] += series[:, None] * (grid.time[grid.read][:, None] >= instants[None, :])
+    return out
+
+
 def heat_steps(trajectory: Trajectory, body: str, instants: Array) -> Array:
     """Response (R, Y, M) to a unit heat at a body from each instant on."""
-    system = trajectory.system
-    time, step = system.grid.time, system.grid.step
+    return _from_each(trajectory, [Column(0, body, np.ones(2 * len(trajectory.system.grid.step)))], instants)
+
+
+def _from_each(trajectory: Trajectory, entering: Sequence[Column], instants: Array) -> Array:
+    """Response (R, Y, M) to what enters states, from each instant on."""
+    time, step = trajectory.system.grid.time, trajectory.system.grid.step
     # an interval that the step divides gets its share, so that edges need not lie on nodes
     share = np.clip((time[1:, None] - instants[None, :]) / step[:, None], 0.0, 1.0)
-    columns = [Column(k, body, np.repeat(share[:, k], 2)) for k in range(len(instants))]
-    return sensitivities(trajectory, (), (), columns)
+    columns = [
+        Column(k, piece.into, piece.series * np.repeat(share[:, k], 2), piece.source)
+        for k in range(len(instants))
+        for piece in entering
+    ]
+    return sensitivities(trajectory, (), (), columns, count=len(instants))
 
 
 def _best(gains: Array, instants: Array) -> tuple[float, float]:

@@ -56,21 +56,30 @@ class Claims:
 
     def signatures(self, trajectory: Trajectory) -> Array:
         """As the function of that name."""
+        entering, showing = self.along(trajectory)
+        out = sensitivities(trajectory, (), (), entering, count=self.count)
+        for mine, y, series in showing:
+            out[:, y, mine] += series
+        return out
+
+    def along(self, trajectory: Trajectory) -> tuple[list[Column], list[tuple[int, int, Array]]]:
+        """What enters states along a trajectory, and amplitude, output and series (R,) of what is shown."""
         system = trajectory.system
         run, steps = system.grid.recording, len(system.grid.step)
         found = [one.value for one in self.program.run(trajectory.at_ends(), system.ends)]
-        columns = [
+        entering = [
             Column(mine, term.into, np.asarray(series), term.source)
             for (h, mine, term), series in zip(self.terms, found, strict=False)
             if h.acts_in(run)
         ]
-        out = sensitivities(trajectory, (), (), columns, count=self.count)
         # along the ends of the steps: what is held is held there, also for a memory of it
         first = np.minimum(2 * system.grid.read, 2 * steps - 1)  # of the step that a reading begins
-        for (h, mine, name), series in zip(self.shown, found[len(self.terms) :], strict=True):
-            if h.acts_in(run):
-                out[:, system.grid.outputs.index(name), mine] += np.broadcast_to(series, (2 * steps,))[first]
-        return out
+        showing = [
+            (mine, system.grid.outputs.index(name), np.broadcast_to(series, (2 * steps,))[first])
+            for (h, mine, name), series in zip(self.shown, found[len(self.terms) :], strict=True)
+            if h.acts_in(run)
+        ]
+        return entering, showing
 
 
 def heat_rms(trajectory: Trajectory, expression: Expression) -> float:

@@ -185,7 +185,13 @@ def _label(effect: Any) -> str:
         "air terms",
     ):
         return "added to the term [W]"
-    if effect.place in ("fluid terms", "cooling terms", "input temperature", "inputs of a recording"):
+    if effect.place in (
+        "fluid terms",
+        "cooling terms",
+        "input temperature",
+        "driving input",
+        "inputs of a recording",
+    ):
         return "the input as the term sees it"
     return "heat into the body [W]"
 

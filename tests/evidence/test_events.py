@@ -13,8 +13,9 @@ from discovery.effects.candidates import Scene, candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab, project, project_one, scan
-from discovery.evidence.events import LEAST, _span, heat_steps, place_events
+from discovery.evidence.events import LEAST, _span, event_steps, heat_steps, place_events
 from discovery.evidence.settings import Setting
+from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise, fit_model
 from discovery.models import Model, Parameter, State
@@ -46,6 +47,24 @@ def test_steps_of_heat_between_nodes_keep_their_share() -> None:
     """Heat that sets in within an interval keeps its energy, so its late response is that of the instant."""
     steps = heat_steps(trajectory(sample()[0]), "bed", np.array([3000.0, 3150.0, 3300.0]))[-1]
     assert np.allclose(steps[:, 1], 0.5 * (steps[:, 0] + steps[:, 2]), rtol=1e-3)
+
+
+@pytest.mark.parametrize("word", ["unmeasured_heat", "draught", "input_missed"])
+def test_a_window_of_an_effect_is_the_difference_of_two_steps(word: str) -> None:
+    """What acts between two instants is what acts from the first on, less what acts from the second on."""
+    seen = seen_of(machine.simulated(1), machine.simulated(2))
+    on, off = 30000.0, 52200.0
+    run = seen.fit.trajectories[1]
+    for h in (h for h in machine.claims(machine.model(), word) if h.recording == "r2"):
+        steps = event_steps(run, h, np.array([on, off]))
+        whole = signatures(run, [h.at(dict(zip(h.shapes, (on, off), strict=True)))])[:, :, 0]
+        # a formula is straight within the interval of its edge, a step is not: half an interval apart
+        grid = run.system.grid
+        far = np.min(np.abs(grid.time[grid.read][:, None] - [on, off]), axis=1) > 7200.0
+        found = (steps[:, :, 0] - steps[:, :, 1])[far]
+        np.testing.assert_allclose(found, whole[far], rtol=0, atol=0.05 * np.abs(whole).max())
+        if word == "unmeasured_heat":
+            np.testing.assert_allclose(steps, heat_steps(run, h.states[0], np.array([on, off])), rtol=1e-12)
 
 
 def sun(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:

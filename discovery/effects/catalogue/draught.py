@@ -1,0 +1,34 @@
+"""A body loses more to the air, or less, during a span of one recording.
+
+    q = G_d (T_air - T) while t_on <= time < t_off    [W]
+
+G_d in W/K, 1 to 20: a door or gate that is open, a fan that somebody placed there; below zero where a cover
+or a fan that stands still lowers the loss. Source: ISO 230-3:2020 (draughts and open doors change the
+exchange with the environment); forced against free convection, 10 to 50 against 2 to 10 W/(m2 K). Limits:
+constant within its window; what comes again and again has a cause to look for, and the verdict is
+`unexplained`.
+"""
+
+from discovery.effects.form import Amplitude, Effect, Example, Shape
+
+EFFECT = Effect(
+    word="draught",
+    title="Draught, or a cover, for a time",
+    group="air and structure",
+    place="body",
+    formula="G_d*(ambient - body)*where(time >= t_on, 1, 0)*where(time < t_off, 1, 0)",
+    amplitude=Amplitude("G_d", "W/K", 5.0, 0),
+    shapes=(Shape("t_on", "s", 0.0, instant=True), Shape("t_off", "s", 1e9, instant=True)),
+    signature="a body comes closer to the air for some hours of one recording, unrelated to any input",
+    confused_with=("unmeasured_heat", "sensor_offset"),
+    source="forced convection has 10 to 50 W/(m2 K) where free convection has 2 to 10 (VDI Heat Atlas, A2)",
+    search="window",
+    acts="in one recording",
+    shared=True,
+    examples=(
+        Example(
+            {"G_d": 5.0, "ambient": 22.0, "body": 30.0, "time": 5000.0, "t_on": 3600.0, "t_off": 7200.0},
+            -40.0,
+        ),
+    ),
+)

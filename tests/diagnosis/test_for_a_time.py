@@ -1,0 +1,67 @@
+"""What happens for a time, or is wrong in one recording: a draught, an input that did not act, a scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from discovery.diagnosis import diagnose
+from discovery.recordings import Recording
+from tests.diagnosis.parts import document
+from tests.machine import SIZES, Array, Concealed, Inputs, campaign, changed, model, simulated
+
+ON, OFF = 36000.0, 70000.0  # s
+
+
+def found(concealed: Concealed | None = None, scale: float = 1.0) -> dict[str, Any]:
+    """What a diagnosis finds where something happens in the second of two recordings."""
+    other: Recording = simulated(2, concealed=concealed)
+    other = changed(other, E_Z=scale * other.values["E_Z"])
+    return document(diagnose(model(), campaign(simulated(1), other), ["r1", "r2"]))
+
+
+def draught(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
+    return 0.0, 6.0 * (u["T_env"] - x[1]) * (ON <= t < OFF), 0.0
+
+
+def covered(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
+    return -3.0 * (u["T_env"] - x[0]) * (ON <= t < OFF), 0.0, 0.0
+
+
+def half_a_drive(t: float, _: Array, u: Inputs) -> tuple[float, float, float]:
+    return -0.5 * SIZES["loss"] * u["P_drive"] * (ON <= t < OFF), 0.0, 0.0
+
+
+def no_fluid(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
+    return 0.0, -SIZES["hF"] * u["pump"] * (u["T_fluid"] - x[1]) * (ON <= t < OFF), 0.0
+
+
+@pytest.mark.parametrize(
+    ("concealed", "effect", "where", "size"),
+    [
+        (draught, "draught", "table", 6.0),
+        (covered, "draught", "motor", -3.0),
+        (half_a_drive, "input_missed", "P_drive", 0.5),
+        (no_fluid, "input_missed", "pump", 1.0),
+    ],
+)
+def test_what_happens_for_a_time_is_named_with_its_hours(
+    concealed: Concealed, effect: str, where: str, size: float
+) -> None:
+    (one,) = found(concealed)["physics"]
+    assert (one["effect"], one["states"], one["recording"]) == (effect, [where], "r2")
+    amount, on, off = one["parameters"].values()
+    assert amount["value"] == pytest.approx(size, rel=0.1)
+    assert on["value"] == pytest.approx(ON, abs=3600)
+    assert off["value"] == pytest.approx(OFF, abs=3600)
+
+
+def test_a_wrong_scale_is_named_in_its_recording() -> None:
+    answer = found(scale=1.15)
+    (one,) = answer["physics"]
+    assert answer["verdict"] == "measurement fault"
+    assert (one["effect"], one["states"], one["recording"]) == ("sensor_gain", ["E_Z"], "r2")
+    (gain,) = one["parameters"].values()
+    assert gain["low"] < 0.15 < gain["high"]
+    assert gain["value"] == pytest.approx(0.15, abs=0.02)
