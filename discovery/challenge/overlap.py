@@ -1,4 +1,4 @@
-"""How well a window of heat was placed in time."""
+"""How well the window of an event was placed in time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Spans = Sequence[tuple[float, float]]
 def overlap(key: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:
     """Intersection over union of the true window and all stated ones; None where the key has no window.
 
-    A named unmeasured_heat states its window in its parameters; otherwise the windows of `location` count.
+    A named event states its window in its parameters; otherwise the windows of `location` count.
     """
     if "window" not in key:
         return None
@@ -52,6 +52,6 @@ def _named_windows(answer: Mapping[str, Any]) -> list[tuple[str, float, float]]:
         edges = {name: p["value"] for name, p in f.get("parameters", {}).items()}
         on = next((v for name, v in edges.items() if name.startswith("t_on")), None)
         off = next((v for name, v in edges.items() if name.startswith("t_off")), None)
-        if f["effect"] == "unmeasured_heat" and f.get("recording") and on is not None and off is not None:
+        if f.get("recording") and on is not None and off is not None:
             out.append((str(f["recording"]), float(on), float(off)))
     return out

@@ -19,7 +19,7 @@ from discovery.challenge.seal import ANSWERS, CASES, SEAL, read_seal, write_seal
 from discovery.errors import UsageError, UserError
 from discovery.files import read_text, write_atomic
 from discovery.progress import Progress
-from discovery.virtual.cases import Case, Plan, draw_plans, make_case
+from discovery.virtual.cases import FAULTS, Case, Plan, draw_plans, make_case
 from discovery.virtual.families import FAMILIES
 
 CONTRACT = (
@@ -27,7 +27,7 @@ CONTRACT = (
     "campaign.toml",
     "baseline.toml",
 )  # and recordings; nothing else goes into a case
-MEASURING = frozenset({"sensor_offset", "sensor_drift", "sensor_lag", "outlier", "clock_shift", "rezero"})
+MEASURING = frozenset(FAULTS)
 
 
 @dataclass(frozen=True)

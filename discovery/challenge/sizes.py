@@ -24,6 +24,8 @@ COMPARED: Mapping[str, tuple[str, bool]] = {
     "second_thermal_mass": ("G_m", False),
     "bed_memory": ("G_bed", False),
     "unmeasured_heat": ("q_u", False),
+    "draught": ("G_d", False),
+    "sensor_gain": ("gain", False),
     "sensor_offset": ("offset", False),
     "sensor_drift": ("drift", False),
     "clock_shift": ("t_shift", False),

@@ -24,12 +24,20 @@ from discovery.virtual.signals import Draw
 from discovery.virtual.world import FIT, RECORDINGS, World, draw_world
 
 KINDS = {"none": 0.23, "one": 0.40, "input": 0.10, "two": 0.09, "measuring": 0.10, "outside": 0.08}
-FAULTS = ("sensor_offset", "sensor_drift", "sensor_lag", "outlier", "rezero", "clock_shift")
+FAULTS = ("sensor_offset", "sensor_drift", "sensor_gain", "sensor_lag", "outlier", "rezero", "clock_shift")
 SIZES = (0.7, 5.0)  # rms that a refit leaves over noise, drawn evenly in its logarithm
 OF_TWO = (1.5, 4.0)
 VISIBLE = 1.0
 ALONE = frozenset(
-    {"radiation", "copper_resistance", "windage", "swarf_heat", "contact_conductance"}
+    {
+        "radiation",
+        "copper_resistance",
+        "windage",
+        "swarf_heat",
+        "contact_conductance",
+        "unmeasured_heat",
+        "draught",
+    }
 )  # never one of two
 
 Key = dict[str, Any]
@@ -184,7 +192,7 @@ def _identity(world: World, effect: Effect, at: Place, size: float, shapes: Shap
     if effect.word == "second_thermal_mass" and shapes.values["cells"] >= 2.5:
         accepts.append("unexplained")  # heat that diffuses is not one mass
     key |= {"accepts": accepts} if accepts else {}
-    if effect.word == "unmeasured_heat" and "recording" in shapes.values:
+    if "recording" in shapes.values:
         start, end, _ = window(world.machine, shapes, world.machine.pace.hours * 3600.0)
         recording = RECORDINGS[int(shapes.values["recording"])]
         key |= {"recording": recording, "window": [recording, round(start), round(end)]}
@@ -197,11 +205,7 @@ def _identity(world: World, effect: Effect, at: Place, size: float, shapes: Shap
 
 def _two(rng: Draw, world: World) -> tuple[dict[str, Columns], Key]:
     """Two effects of their own words and bodies, each well visible next to what is there already."""
-    possible = [
-        e
-        for e in EFFECTS.values()
-        if e.places(world.machine) and e.word not in ALONE and e.word != "unmeasured_heat"
-    ]
+    possible = [e for e in EFFECTS.values() if e.places(world.machine) and e.word not in ALONE]
     both, keys = world, list[Key]()
     for k in rng.permutation(len(possible)):
         taken = tuple(body for key in keys for body in (*key["states"], key.get("output", "")))
@@ -243,6 +247,13 @@ def _measuring(rng: Draw, world: World, word: str) -> tuple[dict[str, Columns], 
         }
         change, more = partial(faults.rezero, jumps=jumps, at_s=at), {"jumps": jumps, "at_s": at}
         del key["output"]
+    elif word == "sensor_gain":
+        unit = next(c.unit for c in machine.channels if c.name == outputs[j])
+        about = machine.words.air if unit == "degC" else ""
+        moved = world.logs(machine, FIT)[where]
+        rms = np.sqrt(np.nanmean((moved[outputs[j]] - (moved[about] if about else 0.0)) ** 2))
+        size = float(f"{sign * min(0.4, sigma[j] * rng.uniform(3.0, 9.0) / rms):.3g}")
+        change, more = partial(faults.sensor_gain, channel=outputs[j], size=size, about=about), {"size": size}
     else:
         low, high = {"outlier": (15.0, 60.0), "sensor_drift": (5.0, 12.0)}.get(word, (3.0, 9.0))
         size = (

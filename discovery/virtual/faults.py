@@ -22,6 +22,12 @@ def sensor_drift(columns: Columns, channel: str, size: float, at_s: float = 0.0)
     return columns | {channel: columns[channel] + size * np.maximum(0.0, columns["time"] - at_s) / DAY}
 
 
+def sensor_gain(columns: Columns, channel: str, size: float, about: str = "") -> Columns:
+    """A sensor shows too much by a share: of its value, or of what it is above another channel."""
+    zero = columns[about] if about else 0.0
+    return columns | {channel: columns[channel] + size * (columns[channel] - zero)}
+
+
 def sensor_lag(columns: Columns, channel: str, size: float) -> Columns:
     """A sensor follows with a time constant of `size` seconds, from its own readings."""
     known = np.flatnonzero(~np.isnan(columns[channel]))

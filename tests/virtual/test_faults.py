@@ -23,6 +23,12 @@ def test_offset_and_drift() -> None:
     np.testing.assert_allclose(drifted, [1, NAN, 2, NAN, 5])
 
 
+def test_a_scale_is_wrong() -> None:
+    np.testing.assert_allclose(faults.sensor_gain(log(), "E", 0.1)["E"], [1.1, NAN, 2.2, NAN, 3.3])
+    about = faults.sensor_gain(log() | {"air": np.full(5, 20.0)}, "T", -0.5, "air")["T"]
+    np.testing.assert_allclose(about, [20.0, 20.5, 21.0, 21.5, 22.0])
+
+
 def test_one_reading_is_wrong() -> None:
     np.testing.assert_array_equal(faults.outlier(log(), "E", 50.0, 61.0)["E"], [1, NAN, 52, NAN, 3])
 

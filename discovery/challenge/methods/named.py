@@ -35,9 +35,9 @@ def named_entry(fit: Fit, h: Hypothesis, probability: float) -> dict[str, Any]:
 
 
 def windows_of(named: Sequence[Hypothesis]) -> list[dict[str, Any]]:
-    """Windows of heat that are named."""
+    """Windows of events at a body that are named."""
     return [
         {"recording": h.recording, "start_s": edges[0], "end_s": edges[1], "state": h.states[0]}
         for h in named
-        if h.effect.word == "unmeasured_heat" and len(edges := list(h.shapes.values())) == 2
+        if h.effect.search == "window" and h.states and len(edges := list(h.shapes.values())) == 2
     ]

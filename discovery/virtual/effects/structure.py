@@ -22,7 +22,7 @@ from discovery.virtual.effects.effect import (
 )
 from discovery.virtual.machine import Machine
 from discovery.virtual.materials import facing
-from discovery.virtual.network import Array, Form, Inputs, Law, link
+from discovery.virtual.network import Array, Form, Gate, Inputs, Law, link
 
 
 def _natural(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
@@ -109,8 +109,8 @@ def window(m: Machine, shapes: Shapes, seconds: float) -> tuple[float, float, fl
     return start, start + length, shapes("edge min", 1.0, 3.0, 7.0) * minutes(m, 1.0)
 
 
-def _unmeasured(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
-    """Heat in one window of one recording (`age` 0 or 1), with soft edges."""
+def _for_a_time(m: Machine, shapes: Shapes) -> Gate:
+    """One in one window of one recording (`age` 0 or 1), with soft edges; else zero."""
     where = float(int(shapes("recording", 0, 0, 2)))
     start, end, edge = window(m, shapes, m.pace.hours * 3600.0)
 
@@ -120,7 +120,19 @@ def _unmeasured(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
             (u["number"] == where) * (np.tanh((t - start) / edge) - np.tanh((t - end) / edge)) / 2
         )
 
+    return gate
+
+
+def _unmeasured(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
+    gate = _for_a_time(m, shapes)
     return m.plus(laws_at("unmeasured", Form.HEAT, stretch(m, at[0], shapes), size, gate))
+
+
+def _draught(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
+    """A door that is open for some hours; size in W/K, with a mild natural convection in it."""
+    gate, p, air = _for_a_time(m, shapes), shapes("m", 0.0, 0.1, 0.2), m.words.air
+    nodes = stretch(m, at[0], shapes)
+    return m.plus(laws_at("draught", Form.POWER, nodes, size / 5.0**p, gate, air, (p,), air))
 
 
 def _second_bodies(m: Machine) -> list[Place]:
@@ -197,6 +209,16 @@ STRUCTURE = (
         lambda m: each(tuple(m.bodies)),
         power(2.0),
         _unmeasured,
+        (),
+        (),
+    ),
+    Effect(
+        "draught",
+        "W/K",
+        "exchange with the air in one window of some hours",
+        lambda m: each(tuple(m.bodies)),
+        conductance(4.0),
+        _draught,
         (),
         (),
     ),
