@@ -53,10 +53,10 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
             continue
         rival = next(o for o in one.hypotheses if o.key not in others)
         gap = max(answer.evidence - one.evidence, 0.0)
-        label = (rival.effect.word, rival.places)
+        label = (rival.effect.word, rival.where)
         if not isfinite(gap):
             continue
-        if label != (h.effect.word, h.places):
+        if label != (h.effect.word, h.where):
             if label not in below or gap < below[label].below:
                 below[label] = Rival(rival, gap)
         elif gap <= thresholds.RIVAL and rival.law == h.law and None in (h.recording, rival.recording):

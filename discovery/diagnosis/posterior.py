@@ -61,9 +61,11 @@ class Posterior:
         return float(np.mean(1.0 / (1.0 + np.exp(-np.clip(odds, -500, 500)))))
 
     def of_claims(self, several: Iterable[Hypothesis]) -> float:
-        """Probability that one of several effects acts at any place, in the recordings of its hypothesis."""
-        claims = {(h.effect.word, h.recording) for h in several}
-        return self.of(lambda m: any((o.effect.word, o.recording) in claims for o in m.hypotheses))
+        """Probability that one of several effects acts at any place, from the inputs that it follows, in the
+        recordings of its hypothesis.
+        """
+        claims = {(h.effect.word, h.follows, h.recording) for h in several}
+        return self.of(lambda m: any((o.effect.word, o.follows, o.recording) in claims for o in m.hypotheses))
 
     @property
     def nothing(self) -> float:
