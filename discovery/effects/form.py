@@ -188,7 +188,7 @@ class Shape:
         if self.middle is None or self.instant:
             return 0.0, inf
         if not self.factor:
-            return -inf, inf
+            return self.middle - FARTHEST * self.spread, self.middle + FARTHEST * self.spread
         return max(self.least, self.middle * self.factor**-FARTHEST), self.middle * self.factor**FARTHEST
 
 
