@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from html import escape
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,7 +28,7 @@ from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
-from discovery.diagnosis.withdrawal import idle, refuted, unfinished, unforeseen, wrong_readings
+from discovery.diagnosis.withdrawal import idle, refuted, small, unfinished, unforeseen, wrong_readings
 from discovery.diagnosis.written import written
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
@@ -202,7 +203,9 @@ def diagnose(
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
-    verdict = decide(context, found, chances)
+    # as if there were little process noise: where it is larger than usual, it has absorbed what is missing
+    forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
+    verdict = small(found, decide(context, found, chances), forces[0].gain if forces else inf)
     verdict, alone, after = with_repair(context, found, verdict, model, seen)
     named = [n.hypothesis for n in verdict.named]
     noise = verdict.answer.noise
@@ -234,8 +237,6 @@ def diagnose(
     further += _reasons(context, verdict, read, proof, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
-    # as if there were little process noise: where it is larger than usual, it has absorbed what is missing
-    forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
     # what changes an output only has no curve of heat
     shown = [] if chances.best.forced and not chances.best.forced_state else forces
     unexplained = verdict.word == UNEXPLAINED and bool(shown)

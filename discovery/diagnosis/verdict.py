@@ -77,7 +77,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         """Whether the effects without a name, all together, explain more than each of them may by chance, and
         improve free runs outside the fit.
         """
-        more = _is_more(answer.evidence - alone, len(others))
+        more = _is_more(answer.evidence - alone, thresholds.SHORT * max(len(others), 1))
         return more and _supports(together_left_out(context, answer, others))
 
     # what does not improve free runs outside the fit is not lacking either
@@ -180,9 +180,9 @@ def _unknown_cause(rest: Sequence[Scored], alone: float, named: bool) -> tuple[S
     return best, max(m.evidence for m in effects)
 
 
-def _is_more(evidence: float, effects: int = 1) -> bool:
-    """Whether so much log evidence is more than may come by chance for each of so many effects."""
-    return evidence > thresholds.SHORT * max(effects, 1)
+def _is_more(evidence: float, least: float = thresholds.SHORT) -> bool:
+    """Whether so much log evidence is more than may come by chance."""
+    return evidence >= least
 
 
 def _stays(n: Named, outside: LeftOut | None) -> bool:
@@ -247,7 +247,7 @@ def _needed(
             for n in kept
         }
         last = max(kept, key=lambda n: levels[n.hypothesis.key])
-        if not whole - levels[last.hypothesis.key] < least:
+        if _is_more(whole - levels[last.hypothesis.key], least):
             break
         kept.remove(last)
     return kept

@@ -30,6 +30,21 @@ def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Ve
     return replace(verdict, word=word, named=(), candidates=(), reasons=tuple(reasons))
 
 
+def small(found: Search, verdict: Verdict, free_heat: float) -> Verdict:
+    """No mismatch where no effect has a name and free heat at no body explains more than it may by chance:
+    evidence of a law that is a little wrong grows with every reading, however little it matters. What free
+    runs miss is asked next.
+
+    Args:
+        free_heat: log evidence of heat of any course at the body where it explains most.
+    """
+    if verdict.word != UNEXPLAINED or verdict.named or coarse(found) or free_heat > 0:
+        return verdict
+    reason = "what acts besides is small: heat of any course at a body explains no more than it may by chance"
+    reasons = (reason, *unrecorded(found), *verdict.reasons)
+    return replace(verdict, word=NO_MISMATCH, candidates=(), reasons=reasons)
+
+
 def _acts(verdict: Verdict, run: str) -> bool:
     """Whether anything that is named may act in a recording."""
     return any(n.hypothesis.acts_in(run) for n in verdict.named)
