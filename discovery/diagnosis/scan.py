@@ -97,7 +97,8 @@ def _alike(h: Hypothesis, other: Hypothesis) -> bool:
 def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
     """An event at the instants of another one."""
     shapes = dict(zip(h.shapes, other.shapes.values(), strict=True))
-    spans = dict(zip(h.shapes, other.spans.values(), strict=True))
+    names = zip(h.shapes, other.shapes, strict=True)
+    spans = {mine: other.spans[its] for mine, its in names if its in other.spans}
     return replace(h.at(shapes, other.log_weight), spans=spans)
 
 

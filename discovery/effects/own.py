@@ -32,10 +32,11 @@ from discovery.schema import Strict
 from discovery.terms import Expression, degree, evaluate, names, parse
 from discovery.terms.expression import rewrite
 
-# places of effects by how many instants are searched for: a jump, or some hours
+_BODIES: tuple[Place, ...] = ("body", "fluid-free body", "wet body", "driven body", "air body")
+# places of effects by how many instants are searched for: when something begins, and when it ends
 _SEARCHED: dict[int, tuple[Place, ...]] = {
-    1: ("output of a recording", "recording"),
-    2: ("body", "fluid-free body", "wet body", "driven body", "air body", "driving input"),
+    1: ("output of a recording", "recording", *_BODIES),
+    2: (*_BODIES, "driving input"),
 }
 
 
@@ -140,8 +141,9 @@ class EffectForm(Strict):
         of_one = bool(instants) or self.place.endswith("recording")
         if instants and self.place not in _SEARCHED.get(instants, ()):
             raise UserError(
-                f"{where}: one instant is when an output jumps, two are when something begins and ends at a "
-                f"body or an input; with {instants} it cannot act at the place '{self.place}'"
+                f"{where}: one instant is when an output jumps or something comes to a body, two are when "
+                f"something begins and ends at a body or an input; with {instants} it cannot act at the "
+                f"place '{self.place}'"
             )
         given = {s.name: Parameter(s.middle or 1.0, s.unit, s.ends[0], per_recording=of_one) for s in shapes}
         check_memory(formula, given, ("body", "other", "y"), where)

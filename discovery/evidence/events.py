@@ -18,7 +18,7 @@ from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, project_one
 from discovery.evidence.outliers import MOST
 from discovery.evidence.settings import Setting
-from discovery.evidence.signatures import Claims
+from discovery.evidence.signatures import Claims, signatures
 from discovery.evidence.whitening import Whitened, log_sum_exp
 from discovery.threads import side_by_side
 
@@ -78,11 +78,15 @@ class _Search:
         """The claim at the best of evenly spread instants, or of all readings for a jump, with what share of
         them the readings leave, and its log Bayes factor; None where the recording is too short.
         """
-        return self._rough_window(h, slab) if h.effect.search == "window" else self._step(h, slab)
+        if h.effect.search == "window":
+            return self._rough_window(h, slab)
+        return self._pulse(h, slab) if h.terms else self._step(h, slab)
 
     def close(self, h: Hypothesis, slab: Slab) -> Hypothesis:
         """The candidate at the best instants near its present ones."""
-        return self._close_window(h, slab) if h.effect.search == "window" else h
+        if h.effect.search == "window":
+            return self._close_window(h, slab)
+        return self._close_pulse(h, slab) if h.terms else h
 
     def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
         """An effect between two instants; it may begin before the recording and end after it."""
@@ -125,7 +129,7 @@ class _Search:
         inside = sooner[None, :] - sooner[:, None]
         first = np.where(instants > time[0], sooner, count)[:, None]
         last = np.where(instants < time[-1], count - sooner, count)[None, :]
-        gains[np.minimum(inside, np.minimum(first, last)) < LEAST] = -np.inf
+        gains[~_enough(inside, first, last)] = -np.inf
         return gains
 
     def _windows(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
@@ -140,6 +144,39 @@ class _Search:
         out = np.full((count, count), -np.inf)
         out[upper] = _log_bayes(dot[upper], gram[upper], flat)
         return out
+
+    def _pulse(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+        """What begins to act in the machine at an instant, and is seen from there on."""
+        coarse = self._coarse()
+        sooner = np.searchsorted(self.read, coarse)
+        instants = coarse[_enough(sooner, len(self.read) - sooner)]
+        if not len(instants):
+            return None
+        gains = self._of_instants(h, instants, slab)
+        weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
+        best = {self._instant(h): float(instants[int(np.argmax(gains))])}
+        return float(np.max(gains)) + weight, h.at(best, weight)
+
+    def _close_pulse(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        coarse, name = self._coarse(), self._instant(h)
+        width, best, spans = float(coarse[1] - coarse[0]), h.shapes[name], {}
+        while width > float(np.min(self.trajectory.system.grid.step)):
+            near = np.clip(best + np.linspace(-width, width, 2 * FINE + 1), coarse[0], coarse[-1])
+            gains = self._of_instants(h, near, slab)
+            spans, best = {name: _span(gains, near)}, float(near[int(np.argmax(gains))])
+            width /= FINE
+        return replace(h.at({name: best}, h.log_weight), spans=spans)
+
+    def _of_instants(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
+        """Log Bayes factor of an effect that begins at each of some instants."""
+        name = self._instant(h)
+        part = self.projected(signatures(self.trajectory, [h.at({name: float(t)}) for t in instants]))
+        flat = Slab(*(np.broadcast_to(v[:1], len(instants)) for v in (slab.median, slab.factor, slab.sign)))
+        return _log_bayes(part.dot, np.maximum(part.gram, 1e-30), flat)
+
+    @staticmethod
+    def _instant(h: Hypothesis) -> str:
+        return next(name for name, shape in zip(h.shapes, h.effect.shapes, strict=True) if shape.instant)
 
     def _step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
         """A jump of one output, or of all, at an instant. Every reading is tried: a filter that follows the
@@ -175,6 +212,11 @@ class _Search:
             dot, gram = (np.concatenate(one) for one in zip(*parts, strict=True))
             self.jumps[output] = dot, gram
         return self.jumps[output]
+
+
+def _enough(*counts: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether there are readings enough in each place, so that these are no wrong ones."""
+    return np.asarray(np.minimum.reduce(np.broadcast_arrays(*counts)) >= LEAST)
 
 
 def _log_bayes(dot: Array, gram: Array, slab: Slab) -> Array:

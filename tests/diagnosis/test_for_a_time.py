@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from discovery.diagnosis import diagnose
@@ -25,12 +26,12 @@ def draught(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
     return 0.0, 6.0 * (u["T_env"] - x[1]) * (ON <= t < OFF), 0.0
 
 
-def covered(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
-    return -3.0 * (u["T_env"] - x[0]) * (ON <= t < OFF), 0.0, 0.0
-
-
 def half_a_drive(t: float, _: Array, u: Inputs) -> tuple[float, float, float]:
     return -0.5 * SIZES["loss"] * u["P_drive"] * (ON <= t < OFF), 0.0, 0.0
+
+
+def cold_workpiece(t: float, _: Array, __: Inputs) -> tuple[float, float, float]:
+    return 0.0, -400.0 * np.exp(-(t - ON) / 900.0) * (t >= ON), 0.0
 
 
 def no_fluid(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
@@ -41,7 +42,6 @@ def no_fluid(t: float, x: Array, u: Inputs) -> tuple[float, float, float]:
     ("concealed", "effect", "where", "size"),
     [
         (draught, "draught", "table", 6.0),
-        (covered, "draught", "motor", -3.0),
         (half_a_drive, "input_missed", "P_drive", 0.5),
         (no_fluid, "input_missed", "pump", 1.0),
     ],
@@ -55,6 +55,15 @@ def test_what_happens_for_a_time_is_named_with_its_hours(
     assert amount["value"] == pytest.approx(size, rel=0.1)
     assert on["value"] == pytest.approx(ON, abs=3600)
     assert off["value"] == pytest.approx(OFF, abs=3600)
+
+
+def test_something_cold_that_comes_to_a_body_is_no_jump_of_a_sensor() -> None:
+    answer = found(cold_workpiece)
+    (one,) = answer["physics"]
+    assert (one["effect"], one["states"], one["recording"]) == ("heat_pulse", ["table"], "r2")
+    power, instant, constant = (p["value"] for p in one["parameters"].values())
+    assert power * constant == pytest.approx(-400.0 * 900.0, rel=0.1)  # J
+    assert instant == pytest.approx(ON, abs=900)
 
 
 def test_a_wrong_scale_is_named_in_its_recording() -> None:

@@ -172,5 +172,6 @@ def trajectory(model: Model, recording: str = "two", still: bool = False) -> Tra
 
 def inside(h: Hypothesis) -> Hypothesis:
     """The hypothesis with instants that lie within the recordings."""
-    instants = {"t_on": 2000.0, "t_off": 7000.0, "t_step": 4000.0, "t_zero": 4000.0, "t_first": 4200.0}
+    instants = {"t_on": 2000.0, "t_off": 7000.0, "t_in": 4000.0}
+    instants |= {"t_step": 4000.0, "t_zero": 4000.0, "t_first": 4200.0}
     return h.at({n: v for n in h.shapes for short, v in instants.items() if n.startswith(short)})

@@ -203,8 +203,9 @@ def test_an_instant_is_searched_for(place: str, search: str) -> None:
     text = text.replace("middle = 17000, factor = 3", "instant = true")
     found = own(text)
     assert (found.search, found.acts) == (search, "in one recording")
-    with pytest.raises(UserError, match="it cannot act at the place 'body'"):
-        own(text.replace(place, "body"))
+    assert own(text.replace(place, "body")).search == "step"
+    with pytest.raises(UserError, match="it cannot act at the place 'pair'"):
+        own(text.replace(place, "pair"))
 
 
 def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:

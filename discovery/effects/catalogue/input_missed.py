@@ -1,8 +1,8 @@
 """A recorded input did not act for a time: a nozzle was clogged, a contactor open, a pump ran dry.
 
-    (1 - missed) u replaces u while t_on <= time < t_off, in every term of the model
+    (1 - missed) f(u) + missed f(0) replaces f(u) while t_on <= time < t_off, in every term f of the model
 
-missed: share of the input that did not arrive, 0 to 1. Source: operator logs; what a control records is what
+missed: share of what the input does that it did not do, 0 to 1. Source: operator logs; what a control records is what
 it asked for. Limits: constant within its window; inputs that are temperatures are none of these; what comes
 again and again has a cause to look for, and the verdict is `unexplained`.
 """
@@ -14,7 +14,7 @@ EFFECT = Effect(
     title="Input that did not act for a time",
     group="measuring chain",
     place="driving input",
-    formula="input*(1 - missed*where(time >= t_on, 1, 0)*where(time < t_off, 1, 0))",
+    formula="input*(1 - where(time >= t_on, 1, 0)*where(time < t_off, 1, 0))",
     amplitude=Amplitude("missed", "1", 0.8, 1, most=1.0),
     shapes=(Shape("t_on", "s", 0.0, instant=True), Shape("t_off", "s", 1e9, instant=True)),
     signature="for some hours of one recording every body goes on as if an input were off",
@@ -23,7 +23,7 @@ EFFECT = Effect(
     search="window",
     acts="in one recording",
     examples=(
-        Example({"input": 200.0, "missed": 0.9, "time": 5000.0, "t_on": 3600.0, "t_off": 7200.0}, 20.0),
-        Example({"input": 200.0, "missed": 0.9, "time": 8000.0, "t_on": 3600.0, "t_off": 7200.0}, 200.0),
+        Example({"input": 200.0, "time": 5000.0, "t_on": 3600.0, "t_off": 7200.0}, 0.0),
+        Example({"input": 200.0, "time": 8000.0, "t_on": 3600.0, "t_off": 7200.0}, 200.0),
     ),
 )
