@@ -15,7 +15,7 @@ from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evidence.bayes import Score, Without, scan
-from discovery.evidence.events import place_events
+from discovery.evidence.events import place_events, shaped
 from discovery.evidence.settings import AXES, Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened
@@ -44,10 +44,13 @@ def scan_model(context: Context, current: Scored) -> Scan:
     offered = [h for h in offered if h.effect.search != "single readings"]
     settings = in_play(context, current)
     events = [h for h in offered if h.effect.search in ("window", "step")]
-    placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
-    moved = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
-    shaped = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
-    every = [*shaped, *placed, *moved]
+    slabs = [context.slab([h]) for h in events]
+    # process noise that has absorbed an event shows neither when it came nor how fast
+    placed = [h for setting in settings for h in place_events(current.seen, setting, events, slabs)]
+    there = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
+    moved = [one for h in there for one in shaped(h)]
+    lasting = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
+    every = [*lasting, *placed, *moved]
     own = [_without(current, h) for h in current.hypotheses]
     found = scan(current.seen, settings, every, context.slab(every), own)
     by_effect = zip(current.hypotheses, found.without, strict=True)
@@ -90,16 +93,20 @@ def inside(context: Context, current: Scored) -> Whitened | None:
 
 
 def _alike(h: Hypothesis, other: Hypothesis) -> bool:
-    """Whether two events are the same at two places of one recording."""
-    return h.recording == other.recording and h.effect.word == other.effect.word
+    """Whether two events of one recording have as many instants."""
+    return h.recording == other.recording and h.effect.search == other.effect.search
 
 
 def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
     """An event at the instants of another one."""
-    shapes = dict(zip(h.shapes, other.shapes.values(), strict=True))
-    names = zip(h.shapes, other.shapes, strict=True)
+    names = list(zip(_instants(h), _instants(other), strict=True))
     spans = {mine: other.spans[its] for mine, its in names if its in other.spans}
-    return replace(h.at(shapes, other.log_weight), spans=spans)
+    return replace(h.at({mine: other.shapes[its] for mine, its in names}, other.log_weight), spans=spans)
+
+
+def _instants(h: Hypothesis) -> list[str]:
+    """Names of its shapes that are instants."""
+    return [name for name, shape in zip(h.shapes, h.effect.shapes, strict=True) if shape.instant]
 
 
 def _without(current: Scored, h: Hypothesis) -> Without:

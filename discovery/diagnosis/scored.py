@@ -252,9 +252,10 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
 
 def shapes_at_end(chosen: Sequence[Hypothesis], fit: Fit) -> list[str]:
     """Shape parameters of effects that a fit takes to the end of their range, where another law acts."""
-    inside = {fit.problem.unknowns[i].name for i in moving(fit)}
+    inside, found = {fit.problem.unknowns[i].name for i in moving(fit)}, fit.model.parameters
     shapes = [pair for h in chosen for pair in zip(h.shapes, h.effect.shapes, strict=True)]
-    return [name for name, shape in shapes if not shape.instant and name not in inside]
+    at_end = [(name, shape) for name, shape in shapes if not shape.instant and name not in inside]
+    return [n for n, shape in at_end if not shape.or_at_once or found[n].value > shape.ends[0]]
 
 
 def under_noise_of(context: Context, one: Scored) -> Scored:

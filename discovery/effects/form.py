@@ -145,7 +145,7 @@ class Shape:
     other on a logarithmic scale. `instant`: a time in the recording, which is searched for by itself.
     `apart`: ratio of neighbouring values in a search, whose signatures are much alike; those of a delay,
     which smooths nothing, are so only close by. `is_shift`: by how much something comes late, which a
-    recording shows only if it is far longer.
+    recording shows only if it is far longer. `or_at_once`: the shortest value stands for none at all.
     """
 
     name: str
@@ -157,6 +157,7 @@ class Shape:
     least: float = 0.0  # what the recordings can show of a time constant
     apart: float = 3.0
     is_shift: bool = False
+    or_at_once: bool = False
 
     def within(self, shortest: float, longest: float) -> Shape:
         """The shape for recordings that show time constants from `shortest` to `longest` [s]."""

@@ -158,14 +158,24 @@ class _Search:
         return float(np.max(gains)) + weight, h.at(best, weight)
 
     def _close_pulse(self, h: Hypothesis, slab: Slab) -> Hypothesis:
+        """At each of the shape values that a search integrates over: what comes at once and what comes slowly
+        begin at other instants.
+        """
+        return max((self._closest(one, slab) for one in shaped(h)), key=lambda found: found[0])[1]
+
+    def _closest(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis]:
         coarse, name = self._coarse(), self._instant(h)
-        width, best, spans = float(coarse[1] - coarse[0]), h.shapes[name], {}
+        width, best, spans, gain = float(coarse[1] - coarse[0]), h.shapes[name], {}, -np.inf
         while width > float(np.min(self.trajectory.system.grid.step)):
             near = np.clip(best + np.linspace(-width, width, 2 * FINE + 1), coarse[0], coarse[-1])
             gains = self._of_instants(h, near, slab)
-            spans, best = {name: _span(gains, near)}, float(near[int(np.argmax(gains))])
+            spans, best, gain = (
+                {name: _span(gains, near)},
+                float(near[np.argmax(gains)]),
+                float(np.max(gains)),
+            )
             width /= FINE
-        return replace(h.at({name: best}, h.log_weight), spans=spans)
+        return gain + h.log_weight, replace(h.at({name: best}, h.log_weight), spans=spans)
 
     def _of_instants(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
         """Log Bayes factor of an effect that begins at each of some instants."""
@@ -212,6 +222,15 @@ class _Search:
             dot, gram = (np.concatenate(one) for one in zip(*parts, strict=True))
             self.jumps[output] = dot, gram
         return self.jumps[output]
+
+
+def shaped(h: Hypothesis) -> list[Hypothesis]:
+    """A hypothesis at each of the values of its shapes that are no instants."""
+    found = [h]
+    for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
+        if not shape.instant:
+            found = [one.at({name: v}, one.log_weight + w) for one in found for v, w in shape.values]
+    return found
 
 
 def _enough(*counts: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -17,7 +17,7 @@ EFFECT = Effect(
     place="body",
     formula="-q_ev*max(sign(flow), lag(sign(flow), t_dry))",
     amplitude=Amplitude("q_ev", "W", 60.0),
-    shapes=(Shape("t_dry", "s", 1800.0, factor=2.0),),
+    shapes=(Shape("t_dry", "s", 1800.0, factor=2.0, or_at_once=True),),
     signature=(
         "after a pump stop the body cools below the air for the drying time; while wet it stays below "
         "the fluid"

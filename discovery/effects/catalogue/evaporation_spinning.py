@@ -18,7 +18,7 @@ EFFECT = Effect(
     place="body",
     formula="-q_ev*max(sign(flow), lag(sign(flow), t_dry))*(1 + b_ev*speed/1000)*exp(0.06*(body - 22))",
     amplitude=Amplitude("q_ev", "W", 30.0),
-    shapes=(Shape("t_dry", "s", 1800.0, factor=2.0), Shape("b_ev", "1", 2.0, factor=2.0)),
+    shapes=(Shape("t_dry", "s", 1800.0, factor=2.0, or_at_once=True), Shape("b_ev", "1", 2.0, factor=2.0)),
     signature="as evaporation, the more the faster the surface turns and the warmer it is",
     confused_with=("sensor_offset", "fluid_convection"),
     source="Lewis relation (Incropera, DeWitt, ch. 6.7): 90 to 240 W/m2 still, 500 to 1400 W/m2 spinning",

@@ -19,7 +19,7 @@ EFFECT = Effect(
     place="any pair",
     formula="G_gap*max(sign(flow), lag(sign(flow), t_gap))*(other - body)",
     amplitude=Amplitude("G_gap", "W/K", 40.0),
-    shapes=(Shape("t_gap", "s", 600.0, factor=3.0),),
+    shapes=(Shape("t_gap", "s", 600.0, factor=3.0, or_at_once=True),),
     signature="two bodies come closer in temperature while the pump runs and until the gap has drained",
     confused_with=(
         "conduction_path",

@@ -17,7 +17,7 @@ EFFECT = Effect(
     place="body",
     formula="q_p*(where(time >= t_in, 1, 0) - lag(where(time >= t_in, 1, 0), t_p))",
     amplitude=Amplitude("q_p", "W", 60.0, 0),
-    shapes=(Shape("t_in", "s", 0.0, instant=True), Shape("t_p", "s", 600.0, factor=3.0)),
+    shapes=(Shape("t_in", "s", 0.0, instant=True), Shape("t_p", "s", 600.0, factor=3.0, or_at_once=True)),
     signature="a body becomes warmer or colder within minutes, unrelated to any input, and comes back slowly",
     confused_with=("sensor_offset", "unmeasured_heat"),
     source="heat balance of a mass that is brought in: a cold fluid, a workpiece, a pallet",

@@ -2,9 +2,9 @@
 
     (1 - missed) f(u) + missed f(0) replaces f(u) while t_on <= time < t_off, in every term f of the model
 
-missed: share of what the input does that it did not do, 0 to 1. Source: operator logs; what a control records is what
-it asked for. Limits: constant within its window; inputs that are temperatures are none of these; what comes
-again and again has a cause to look for, and the verdict is `unexplained`.
+missed: share of what the input does that it did not do, 0 to 1. Source: operator logs; what a control records
+is what it asked for. Limits: constant within its window; inputs that are temperatures are none of these; what
+comes again and again has a cause to look for, and the verdict is `unexplained`.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape

@@ -18,6 +18,7 @@ EFFECT = Effect(
     shapes=(Shape("t_step", "s", 0.0, instant=True),),
     signature="one error jumps between two readings and stays, the others do not",
     confused_with=(
+        "heat_pulse",
         "unmeasured_heat",
         "rezero",
     ),
