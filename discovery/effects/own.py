@@ -63,6 +63,7 @@ class ShapeForm(Strict):
 
     With `factor`: 68 % of values lie within this factor of `middle`. With `spread`: within so much of it.
     Neither: any time that the recordings can show. `instant`: a time in the recording, found by search.
+    `or_at_once`: a time constant whose shortest value stands for none at all.
     """
 
     unit: Unit = "1"
@@ -70,6 +71,7 @@ class ShapeForm(Strict):
     factor: float | None = Field(None, gt=1, description="68 % of values lie within this factor of it")
     spread: float | None = Field(None, gt=0, description="68 % of values lie within this distance of it")
     instant: bool = Field(False, description="a time in the recording, which the search finds")
+    or_at_once: bool = Field(False, description="its shortest value stands for no delay at all")
 
     @model_validator(mode="after")
     def _is_a_prior(self) -> Self:
@@ -87,7 +89,15 @@ class ShapeForm(Strict):
     def shape(self, name: str) -> Shape:
         """The shape as the catalogue holds it."""
         middle = 0.0 if self.instant else self.middle
-        return Shape(name, self.unit, middle, self.factor or 0.0, self.spread or 0.0, self.instant)
+        return Shape(
+            name,
+            self.unit,
+            middle,
+            self.factor or 0.0,
+            self.spread or 0.0,
+            self.instant,
+            or_at_once=self.or_at_once,
+        )
 
 
 class EffectForm(Strict):

@@ -930,6 +930,25 @@ def test_a_repair_that_cannot_run_has_no_name() -> None:
     assert withdrawn.reasons[0] == "with fluid_convection at table, free runs of the model do not stay finite"
 
 
+def fitted(name: str, value: float, bounds: tuple[float, float]) -> Fit:
+    """A fit as far as a shape at the end of its range is asked of it."""
+    problem = SimpleNamespace(
+        unknowns=[SimpleNamespace(name=name)], bounds=tuple(np.array([b]) for b in bounds)
+    )
+    model = SimpleNamespace(parameters={name: SimpleNamespace(value=value)})
+    return cast(Fit, SimpleNamespace(problem=problem, theta=np.array([value]), model=model))
+
+
+@pytest.mark.parametrize(("at_end", "is_named"), [("least", True), ("most", False)])
+def test_a_gap_that_drains_at_once_keeps_its_name(at_end: str, is_named: bool) -> None:
+    gap = replace(claim("flooded_gap", "motor"), shapes={"t_gap_motor": 600.0})
+    (shape,) = gap.effect.shapes
+    named = said(Tried([Model((gap,), 100.0), Model((), 0.0)]), {"flooded_gap": 0.9})
+    value = shape.ends[0] if at_end == "least" else shape.ends[1]
+    left = beyond_range(named, fitted("t_gap_motor", value, shape.ends))
+    assert (left is named) == is_named
+
+
 @pytest.mark.parametrize("others", [(), (FLUID,)])
 @pytest.mark.parametrize(("time", "is_named"), [(7.8e5, False), (2e5, True)])
 def test_a_repair_at_the_end_of_a_range_has_no_name(
@@ -942,9 +961,7 @@ def test_a_repair_at_the_end_of_a_range_has_no_name(
     names = {h.effect.word: 0.9 for h in (bed, *others)}
     found = pair(FLUID, bed, 200.0, 100.0, 100.0) if others else Tried([Model((bed,), 100.0), Model((), 0.0)])
     named = said(found, names)
-    bounds = np.array([1.8e4]), np.array([7.8e5])
-    problem = SimpleNamespace(unknowns=[SimpleNamespace(name="t_bed_motor")], bounds=bounds)
-    left = beyond_range(named, cast(Fit, SimpleNamespace(problem=problem, theta=np.array([time]))))
+    left = beyond_range(named, fitted("t_bed_motor", time, (1.8e4, 7.8e5)))
     if is_named:
         assert left is named
         return
