@@ -26,6 +26,7 @@ from discovery.diagnosis.withdrawal import (
     idle,
     refuted,
     runs_away,
+    small,
     unfinished,
     unforeseen,
     wrong_readings,
@@ -772,10 +773,10 @@ def improved(before: float, after: float, low: float, high: float) -> Improvemen
 
 def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     named = said(WET, {"fluid_convection": 0.9})
-    large, small = improved(2.0, 1.0, 0.1, 1.5), improved(2.0, 1.995, -0.1, 0.3)
+    large, little = improved(2.0, 1.0, 0.1, 1.5), improved(2.0, 1.995, -0.1, 0.3)
     another_machine = improved(200.0, 260.0, -70.0, -50.0)
     assert idle(cast(Any, WET), named, {"r1": large}) is named
-    withdrawn = idle(cast(Any, WET), named, {"r1": small, "r2": small})
+    withdrawn = idle(cast(Any, WET), named, {"r1": little, "r2": little})
     assert (withdrawn.word, withdrawn.named) == ("no mismatch", ())
     assert withdrawn.reasons[0].startswith("fluid_convection at table: too little for free runs")
     assert "(their rms falls by 0.25 % on average" in withdrawn.reasons[0]
@@ -786,9 +787,11 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     )
     assert idle(cast(Any, WET), named, {"r1": large, "r2": large, "r3": another_machine}) is named
     heated = Tried([Model((FLUID,), 50.0), Model((), 0.0, unrecorded=0.1)])
-    assert "about 10 % of what flows" in idle(cast(Any, heated), named, {"r1": small, "r2": small}).reasons[1]
+    assert (
+        "about 10 % of what flows" in idle(cast(Any, heated), named, {"r1": little, "r2": little}).reasons[1]
+    )
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
-    assert idle(cast(Any, far), named, {"r1": small, "r2": small}).word == "unexplained"
+    assert idle(cast(Any, far), named, {"r1": little, "r2": little}).word == "unexplained"
 
 
 def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
@@ -928,6 +931,28 @@ def test_a_repair_that_cannot_run_has_no_name() -> None:
     withdrawn = runs_away(named)
     assert (withdrawn.word, withdrawn.named, withdrawn.candidates) == ("unexplained", (), named.named)
     assert withdrawn.reasons[0] == "with fluid_convection at table, free runs of the model do not stay finite"
+
+
+def test_two_inputs_that_heat_alike_are_rivals() -> None:
+    """On an engine the exhausts of two cylinders explained a head alike, and one was named, 90 % sure."""
+    one, other = (replace(claim("input_heat", "table"), channels=(gas,)) for gas in ("gas_a", "gas_b"))
+    named = said(Tried([Model((one,), 100.0), Model((other,), 99.0), Model((), 0.0)]), {"input_heat": 0.9})
+    (n,) = named.named
+    assert [(r.hypothesis.where, r.below) for r in n.rivals] == [("table from gas_b", 1.0)]
+
+
+def test_what_has_no_name_has_to_show_as_heat_at_a_body() -> None:
+    """Evidence of a law that is wrong by 2 % grows with every reading."""
+    nameless = Verdict("unexplained", cast(Any, WET.best), (), (), ("no effect is sure enough",))
+    small_one = small(cast(Any, WET), nameless, -60.0)
+    assert (small_one.word, small_one.named) == ("no mismatch", ())
+    assert small_one.reasons[0].startswith("what acts besides is small")
+    assert small_one.reasons[-1] == "no effect is sure enough"
+    assert small(cast(Any, WET), nameless, 40.0) is nameless
+    coarse_one = Tried([replace(m, off=0.25) for m in WET.models])
+    assert small(cast(Any, coarse_one), nameless, -60.0) is nameless
+    named = said(WET, {"fluid_convection": 0.9})
+    assert small(cast(Any, WET), named, -60.0) is named
 
 
 def fitted(name: str, value: float, bounds: tuple[float, float]) -> Fit:
