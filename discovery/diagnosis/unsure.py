@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor, isfinite
+from math import ceil, floor, isfinite
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.named import Named, added, claims
@@ -58,12 +58,17 @@ def _unsure(n: Named, added: float, least: float, alone: str) -> str:
         )
     # a high probability next to too little evidence reads like a contradiction: only what is short is said
     short = []
-    if added < least:  # 15.96 is not shown as 16
-        short.append(f"log evidence {printed(floor(10 * added) / 10)} of the {printed(least)}")
+    if added < least:  # 15.96 of 16 is not shown as 16, nor 49.72 of 49.74 as 49.7 of 49.7
+        short.append(
+            f"log evidence {printed(floor(10 * added) / 10)} of the {printed(ceil(10 * least) / 10)}"
+        )
     if n.together < thresholds.NAMED:
         short.insert(0, f"{chance} of the {thresholds.NAMED:g}")
     return f"{name} is possible but not sure enough to be named ({' and '.join(short)} that a name needs)"
 
 
 def _chance(probability: float) -> str:
+    """A probability with two digits; 0.698 of 0.7 is not shown as 0.70."""
+    if 0 < thresholds.NAMED - probability < 0.005:
+        return f"{floor(100 * probability) / 100:.2f}"
     return f"{probability:.2f}" if probability >= 0.005 else "below 0.01"

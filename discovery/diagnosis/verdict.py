@@ -99,7 +99,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             for h in faults
         ]
         by_law = any(best is one for one in laws)
-        few = "the effects that are sure enough explain too little" if named else "no effect is sure enough"
+        has_names = bool(named)
+        few = (
+            "the effects that are sure enough explain too little" if has_names else "no effect is sure enough"
+        )
         named = tuple(
             _needed(
                 mostly, least, lambda some, goal: _unknown_beside(context, found, answer, some, goal, by_law)
@@ -116,7 +119,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             reasons += [f"{best.forced} {does}"] if best.forced else []
             reasons.append(
                 f"{few}: the best model of all has {max(m.evidence for m in rest) - alone:.0f} more log "
-                "evidence"
+                f"evidence than the model {'with them' if has_names else 'as it is'}"
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     further = (

@@ -30,7 +30,8 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) ->
     if limits is None:
         return
     unit = f" {channel.unit}" if channel.unit != "1" else ""
-    kind = "temperature" if channel.role == "other input" else channel.role
+    is_other = channel.role == "other input"  # of these, temperatures alone have limits
+    kind = "temperature" if is_other else channel.role
     do = f"check its unit and the sensor; usual is {limits.usual[0]:g} to {limits.usual[1]:g}{unit}"
     impossible = _outside(column, _with_noise(limits.possible, column))
     if impossible.size:
@@ -41,7 +42,8 @@ def range_findings(file: Path, lines: Lines, channel: Channel, column: Array) ->
     outside = _outside(column, _with_noise(limits.usual, column))
     unusual = np.setdiff1d(outside, [*impossible, *left_out]).astype(np.intp)
     if unusual.size:
-        what = f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for a channel of role {kind}"
+        a_kind = f"a {kind}" if is_other else f"a channel of role {kind}"
+        what = f"'{channel.name}' is {column[unusual[0]]:g}{unit}, unusual for {a_kind}"
         yield Finding("warning", file, int(lines[unusual[0]]), what + more(unusual.size), do)
 
 
