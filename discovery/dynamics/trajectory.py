@@ -13,6 +13,7 @@ from discovery.dynamics import kernel
 from discovery.dynamics.grid import interleaved
 from discovery.dynamics.starts import start_values
 from discovery.dynamics.system import System
+from discovery.dynamics.transitions import transitions
 from discovery.errors import RunsAwayError
 from discovery.terms import Dual
 from discovery.terms.dual import Value
@@ -90,7 +91,7 @@ def simulate(
         with np.errstate(all="ignore"):
             x, step = _nearer(system, values, first, last, x) if last else (x, np.inf)
             a, g0, g1 = _linearise(system, values, x)
-        which, e, w0, w1 = kernel.transitions(a, system.grid.step)
+        which, e, w0, w1 = transitions(a, system.grid.step)
         new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
         if not np.all(np.abs(new) < _FAR):
             return _in_windows(system, values, first)
@@ -139,7 +140,7 @@ def _in_windows(system: System, values: Mapping[str, float], first: Array) -> Tr
         x[done : end + 1], done = found, end
         wide *= 2 if quick else 1
     a = _linearise(system, values, x)[0]
-    return Trajectory(system, dict(values), x, a, *kernel.transitions(a, system.grid.step))
+    return Trajectory(system, dict(values), x, a, *transitions(a, system.grid.step))
 
 
 def _no_number(system: System, values: Mapping[str, float], first: Array) -> str:
@@ -167,7 +168,7 @@ def _window(
     for count in range(_FEW if shortest and not system.affine else _ROUNDS):
         with np.errstate(all="ignore"):
             a, g0, g1 = _linearise(system, values, x)
-            which, e, w0, w1 = kernel.transitions(a, system.grid.step)
+            which, e, w0, w1 = transitions(a, system.grid.step)
             new = kernel.trajectory(which, e, w0, w1, g0, g1, first)
         if not np.all(np.abs(new) < _FAR):
             return None, False

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from discovery.dynamics import System, kernel, make_grid, make_system, predict, simulate
+from discovery.dynamics import System, make_grid, make_system, predict, simulate
+from discovery.dynamics.transitions import transitions
 from discovery.models import Model, Parameter, State
 from discovery.models.thermobalance import thermobalance
 from discovery.recordings import Campaign, Channel, Recording
@@ -259,7 +260,7 @@ def test_exponentials_side_by_side_are_those_of_scipy() -> None:
     a = rng.normal(size=(count, n, n)) * 10 ** rng.uniform(-4, 0.3, size=(count, 1, 1))
     h = rng.choice([10.0, 60.0], count)
     a[7] = np.nan
-    which, e, w0, w1 = kernel.transitions(a, h)
+    which, e, w0, w1 = transitions(a, h)
     assert which.tolist() == list(range(count))
     assert np.isnan(e[7]).all()
     for k in set(range(count)) - {7}:
