@@ -32,7 +32,7 @@ def recorded(body: Array) -> list[str]:
     [
         (lambda v: np.where(np.arange(v.size) > 99, v[99], v), "'body' stays at "),
         (lambda v: np.where(np.arange(v.size) % 40 == 7, 0.0, v), "'body' is 0, exactly zero between"),
-        (lambda v: np.full(v.size, -180.0), "unusual for a channel of role temperature"),
+        (lambda v: np.full(v.size, -180.0), "unusual for a temperature"),
         (lambda v: v - 300.0, "no temperature can be that"),
         (lambda v: np.where(np.isin(np.arange(v.size), [60, 61]), v + 400.0, v), "2 readings in a row"),
         (lambda v: v + 15.0 * (np.arange(v.size) > 150), "'body' jumps from "),
