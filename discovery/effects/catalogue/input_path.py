@@ -3,8 +3,8 @@
     error shown = y + k lag(u/u_max, t_path)    [um]
 
 k in the unit of the error at the largest value that was recorded, of either sign; t_path: whatever the
-recordings can show. Source: sums of first-order responses, eq. (8) of Mayr et al. 2015. Limits: one time
-constant; settled at the first instant.
+recordings can show, or none: a load bends a frame at once. Source: sums of first-order responses, eq. (8) of
+Mayr et al. 2015. Limits: one time constant; settled at the first instant.
 """
 
 from discovery.effects.form import DRIVING, Amplitude, Effect, Example, Shape
@@ -16,7 +16,7 @@ EFFECT = Effect(
     place="output that is no temperature",
     formula="k_path*lag(level, t_path)",
     amplitude=Amplitude("k_path", "um", 10.0, 0),
-    shapes=(Shape("t_path", "s", None),),
+    shapes=(Shape("t_path", "s", None, or_at_once=True),),
     signature="one error follows a recorded input with a time constant that the model does not have",
     confused_with=("second_thermal_mass", "sensor_lag"),
     source="Mayr et al. 2015, eq. (8): an error is a sum of first-order responses to its inputs",
