@@ -99,14 +99,9 @@ def _alike(h: Hypothesis, other: Hypothesis) -> bool:
 
 def _at_instants(h: Hypothesis, other: Hypothesis) -> Hypothesis:
     """An event at the instants of another one."""
-    names = list(zip(_instants(h), _instants(other), strict=True))
+    names = list(zip(h.instants, other.instants, strict=True))
     spans = {mine: other.spans[its] for mine, its in names if its in other.spans}
     return replace(h.at({mine: other.shapes[its] for mine, its in names}, other.log_weight), spans=spans)
-
-
-def _instants(h: Hypothesis) -> list[str]:
-    """Names of its shapes that are instants."""
-    return [name for name, shape in zip(h.shapes, h.effect.shapes, strict=True) if shape.instant]
 
 
 def _without(current: Scored, h: Hypothesis) -> Without:

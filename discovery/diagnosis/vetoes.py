@@ -19,7 +19,8 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
     """
     is_clock = h.effect.place == "inputs of a recording"
     is_offset = h.effect.place == "input temperature" and len(context.recordings) > 1
-    if not is_clock and not is_offset and h.effect.search != "window":
+    is_event = h.effect.search == "window" or (h.effect.is_event and h.effect.is_physics)
+    if not is_clock and not is_offset and not is_event:
         return None
     alike = [o for o in answer.hypotheses if o.effect.place == h.effect.place and o.places == h.places]
     if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):

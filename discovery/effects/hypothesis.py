@@ -72,6 +72,12 @@ class Hypothesis:
         return tuple(n for n in self.channels if n not in self.places) if self.effect.roles else ()
 
     @property
+    def instants(self) -> tuple[str, ...]:
+        """Names of its shapes that are times in the recording."""
+        pairs = zip(self.shapes, self.effect.shapes, strict=True)
+        return tuple(name for name, shape in pairs if shape.instant)
+
+    @property
     def law(self) -> tuple[object, ...]:
         """What acts, and where, in whatever recordings."""
         return self.effect.word, self.effect.formula, self.states, self.outputs, self.channels

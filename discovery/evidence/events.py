@@ -96,14 +96,14 @@ class _Search:
         if not possible:
             return None
         weight = float(log_sum_exp(gains.ravel()) - np.max(gains)) - float(np.log(possible))
-        edges = dict(zip(h.shapes, _best(gains, coarse), strict=True))
+        edges = dict(zip(h.instants, _best(gains, coarse), strict=True))
         spans = {n: (t - coarse[1] + coarse[0], t + coarse[1] - coarse[0]) for n, t in edges.items()}
         return float(np.max(gains)) + weight, replace(h.at(edges, weight), spans=spans)
 
     def _close_window(self, h: Hypothesis, slab: Slab) -> Hypothesis:
         coarse = self._coarse()
         width = float(coarse[1] - coarse[0])
-        begin, end = h.shapes
+        begin, end = h.instants
 
         def gains(instants: Array) -> Array:
             return self._allowed(self._windows(h, instants, slab), instants)
@@ -154,7 +154,7 @@ class _Search:
             return None
         gains = self._of_instants(h, instants, slab)
         weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
-        best = {self._instant(h): float(instants[int(np.argmax(gains))])}
+        best = {h.instants[0]: float(instants[int(np.argmax(gains))])}
         return float(np.max(gains)) + weight, h.at(best, weight)
 
     def _close_pulse(self, h: Hypothesis, slab: Slab) -> Hypothesis:
@@ -164,29 +164,24 @@ class _Search:
         return max((self._closest(one, slab) for one in shaped(h)), key=lambda found: found[0])[1]
 
     def _closest(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis]:
-        coarse, name = self._coarse(), self._instant(h)
-        width, best, spans, gain = float(coarse[1] - coarse[0]), h.shapes[name], {}, -np.inf
-        while width > float(np.min(self.trajectory.system.grid.step)):
+        """The hypothesis at the best instant near its present one, with its log Bayes factor."""
+        coarse, (name,) = self._coarse(), h.instants
+        width, best = float(coarse[1] - coarse[0]), h.shapes[name]
+        while True:
             near = np.clip(best + np.linspace(-width, width, 2 * FINE + 1), coarse[0], coarse[-1])
             gains = self._of_instants(h, near, slab)
-            spans, best, gain = (
-                {name: _span(gains, near)},
-                float(near[np.argmax(gains)]),
-                float(np.max(gains)),
-            )
-            width /= FINE
-        return gain + h.log_weight, replace(h.at({name: best}, h.log_weight), spans=spans)
+            best, width = float(near[np.argmax(gains)]), width / FINE
+            if width <= float(np.min(self.trajectory.system.grid.step)):
+                break
+        found = replace(h.at({name: best}, h.log_weight), spans={name: _span(gains, near)})
+        return float(np.max(gains)) + h.log_weight, found
 
     def _of_instants(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
         """Log Bayes factor of an effect that begins at each of some instants."""
-        name = self._instant(h)
+        (name,) = h.instants
         part = self.projected(signatures(self.trajectory, [h.at({name: float(t)}) for t in instants]))
         flat = Slab(*(np.broadcast_to(v[:1], len(instants)) for v in (slab.median, slab.factor, slab.sign)))
         return _log_bayes(part.dot, np.maximum(part.gram, 1e-30), flat)
-
-    @staticmethod
-    def _instant(h: Hypothesis) -> str:
-        return next(name for name, shape in zip(h.shapes, h.effect.shapes, strict=True) if shape.instant)
 
     def _step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
         """A jump of one output, or of all, at an instant. Every reading is tried: a filter that follows the
@@ -195,7 +190,7 @@ class _Search:
         instants = self.read[LEAST : len(self.read) - LEAST]
         if not len(instants):
             return None
-        (name,) = h.shapes
+        (name,) = h.instants
         gains = np.zeros(len(instants))
         for k, output in enumerate(h.shown):
             one = slab.take(np.full(len(instants), min(k, len(slab.median) - 1)))
@@ -245,7 +240,7 @@ def _log_bayes(dot: Array, gram: Array, slab: Slab) -> Array:
 
 def event_steps(trajectory: Trajectory, h: Hypothesis, instants: Array) -> Array:
     """Response (R, Y, M) to a unit of an effect between two instants that acts from each instant on."""
-    begin, end = h.shapes
+    begin, end = h.instants
     whole = Claims.of([h.at({begin: -np.inf, end: np.inf})], trajectory.system.model)
     entering, showing = whole.along(trajectory)
     out = _from_each(trajectory, entering, instants)

@@ -11,6 +11,7 @@ from scipy.stats import norm
 from discovery.dynamics import make_grid
 from discovery.effects.candidates import Scene, candidates
 from discovery.effects.catalogue import catalogue
+from discovery.effects.form import Shape
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Slab, project, project_one, scan
 from discovery.evidence.events import LEAST, _span, event_steps, heat_steps, place_events
@@ -102,6 +103,18 @@ def test_heat_of_some_hours_is_found_where_and_when_it_acted() -> None:
         assert low - 3600 <= instant <= high + 3600
     assert abs(scores[0].size[0]) == pytest.approx(40.0, rel=0.25)
     assert h.log_weight < 0  # an instant that had to be found among many
+
+
+def test_an_event_may_have_shapes_next_to_its_instants() -> None:
+    """One of a user: a draught that builds up."""
+    usual = catalogue()["draught"]
+    formula = f"(1 - exp(-time/t_build))*{usual.formula}"
+    slow = replace(usual, formula=formula, shapes=(Shape("t_build", "s", 3600.0, factor=2.0), *usual.shapes))
+    seen = seen_of(machine.simulated(1), machine.simulated(2, concealed=sun))
+    claims = candidates(machine.model(), [slow], machine.scene(machine.model()))
+    placed = place_events(seen, SETTING, claims, [SLAB] * len(claims))
+    assert len(placed) == len(claims)
+    assert all(h.shapes[h.instants[0]] < h.shapes[h.instants[1]] for h in placed)
 
 
 def test_a_jump_of_a_sensor_is_found_between_two_readings() -> None:
