@@ -61,4 +61,6 @@ def when(claim: Mapping[str, Any]) -> str:
     >>> when({"recording": "monday"}), when({"recording": "monday", "lasts": True})
     ('in monday', 'from monday on')
     """
+    if claim.get("grows"):
+        return f"from {claim['recording']} on, more in each recording"
     return f"from {claim['recording']} on" if claim.get("lasts") else f"in {claim['recording']}"

@@ -56,6 +56,7 @@ class _Claimed(TypedDict):
     states: list[str]
     recording: str | None
     lasts: bool
+    grows: bool
     channels: list[str]
 
 
@@ -125,6 +126,7 @@ def _claim(h: Hypothesis) -> _Claimed:
         "states": list(h.places),
         "recording": h.recording,
         "lasts": h.effect.acts == "from a recording on",
+        "grows": h.effect.grows,
         "channels": list(h.follows),
     }
 

@@ -37,6 +37,7 @@ class Claim(Strict):
     states: list[str] = Field(description="states it enters; for a measurement fault the output or input")
     recording: str | None = Field(None, description="the one in which it acts, or begins to act")
     lasts: bool = Field(default=False, description="whether it acts in all later recordings, too")
+    grows: bool = Field(default=False, description="whether it grows by as much in each of them")
     channels: list[str] = Field(default_factory=list, description="inputs that it follows")
 
 

@@ -14,6 +14,8 @@ from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict
 from discovery.fitting import Fit
 from discovery.printed import printed
 
+SMALL = "what acts besides is small: heat of any course at a body explains no more than it may by chance"
+
 
 def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Verdict:
     """No name where what was named does too little for free runs, on average over the recordings in which it
@@ -40,8 +42,7 @@ def small(found: Search, verdict: Verdict, free_heat: float) -> Verdict:
     """
     if verdict.word != UNEXPLAINED or verdict.named or coarse(found) or free_heat > 0:
         return verdict
-    reason = "what acts besides is small: heat of any course at a body explains no more than it may by chance"
-    reasons = (reason, *unrecorded(found), *verdict.reasons)
+    reasons = (SMALL, *unrecorded(found), *verdict.reasons)
     return replace(verdict, word=NO_MISMATCH, candidates=(), reasons=reasons)
 
 
@@ -148,8 +149,13 @@ def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
         else f"an event or a fault can only be recognised with a model that is nearly right: {missed}"
     )
     return replace(
-        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *verdict.reasons)
+        verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *_large(verdict))
     )
+
+
+def _large(verdict: Verdict) -> tuple[str, ...]:
+    """The reasons of a verdict where free runs miss: what acts is not small."""
+    return tuple(reason for reason in verdict.reasons if reason != SMALL)
 
 
 def _misses(run: Improvement, rms: float, power: int = 1) -> bool:
@@ -182,7 +188,7 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
         f"its spread: rms {sizes}; something acts there that the recordings to fit do not show"
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
-    return replace(verdict, word=word, reasons=(*verdict.reasons, reason))
+    return replace(verdict, word=word, reasons=(*_large(verdict), reason))
 
 
 def wrong_readings(verdict: Verdict, single: int, hung: int = 0) -> Verdict:

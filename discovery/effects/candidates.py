@@ -102,6 +102,8 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
     runs: tuple[str | None, ...] = (None,) if effect.acts == "always" else scene.recordings
     if effect.acts == "from a recording on" and effect.place != "input temperature":
         runs = scene.recordings[1:]  # what is common to all recordings is the model's own parameter
+    if effect.grows:  # from the second one on; of two it is a step
+        runs = tuple(sorted(runs, key=lambda run: -len(scene.after[run or ""]))[:1]) if runs[1:] else ()
     for chosen in product(*choices):
         binding = {v: _bound(v, c, scene) for v, c in zip(wanted, chosen, strict=True)}
         if LEVEL in used and INPUT in used:

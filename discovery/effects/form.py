@@ -216,7 +216,8 @@ class Effect:
     their channel becomes (the first of `REPLACED` that it names). For outputs `y` is the error without the
     effect. Where states have no capacity (phenomenological models) it is a rate.
 
-    `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on.
+    `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on;
+    `grows`: in each recording from there on by as much more.
     `shared`: also offered at all its places at once, with one size. `spreads`: also offered at two linked
     bodies at once, with a size at each. `roles`: of the recorded inputs that its formula may follow, and
     `inputs_in` a unit of theirs, where it needs one; `unless`: of a recorded input that would say that it
@@ -235,6 +236,7 @@ class Effect:
     shapes: tuple[Shape, ...] = ()
     search: Literal["shapes", "window", "step", "single readings"] = "shapes"
     acts: Literal["always", "in one recording", "from a recording on"] = "always"
+    grows: bool = False
     shared: bool = False
     spreads: bool = False
     roles: tuple[str, ...] = ()

@@ -22,7 +22,7 @@ class Hypothesis:
     `terms` enter states; `shown` is what outputs show in addition, in terms of what they showed before
     (`BEFORE`), or by how much they see the body of `states` moved. Both hold the amplitudes and shapes as
     parameters. `recording`: the one in which it acts, or begins to act; `switch` is then the parameter that
-    is one in the recordings of `acting` and zero in others.
+    is one in the recordings of `acting` (1, 2, 3 ... if it grows) and zero in others.
     """
 
     effect: Effect
@@ -60,7 +60,8 @@ class Hypothesis:
     @property
     def stated(self) -> str:
         """The effect, where it acts, and the recording of an event."""
-        run = {"recording": self.recording, "lasts": self.effect.acts == "from a recording on"}
+        lasts = self.effect.acts == "from a recording on"
+        run = {"recording": self.recording, "lasts": lasts, "grows": self.effect.grows}
         event = f" {when(run)}" if self.recording and self.places else ""
         return f"{self.effect.word} at {self.where}{event}"
 
@@ -110,13 +111,19 @@ class Hypothesis:
         """Whether it acts in a recording."""
         return self.recording is None or recording in self.acting
 
+    def share(self, recording: str) -> float:
+        """How much of it acts in a recording: all or nothing, or one step more in each that follows."""
+        if not self.effect.grows or not self.acts_in(recording):
+            return float(self.acts_in(recording))
+        return 1.0 + self.acting.index(recording)
+
     def at(self, shapes: Mapping[str, float], log_weight: float = 0.0) -> Hypothesis:
         """The same claim with other shape values."""
         return replace(self, shapes={**self.shapes, **shapes}, log_weight=log_weight)
 
     def values(self, recording: str, size: float = 1.0) -> dict[str, float]:
         """Its parameters in a recording, with amplitudes of a size."""
-        switch = {self.switch: float(self.acts_in(recording))} if self.switch else {}
+        switch = {self.switch: self.share(recording)} if self.switch else {}
         return {**self.shapes, **dict.fromkeys(self.amplitudes, size), **switch}
 
     def added_to(self, model: Model, start: Mapping[str, float] | None = None) -> Model:
@@ -136,7 +143,7 @@ class Hypothesis:
             low, high = shape.ends
             parameters[name] = Parameter(start.get(name, value), self._unit(name), low, high, shape.instant)
         if self.switch:
-            acting = dict.fromkeys(self.acting, 1.0)
+            acting = {run: self.share(run) for run in self.acting}
             parameters[self.switch] = Parameter(0.0, "1", -inf, inf, True, True, values=acting)
         outputs = {
             name: Apply("+", (model.outputs.get(name, Name(name)), extra))

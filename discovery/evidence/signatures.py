@@ -68,14 +68,18 @@ class Claims:
         run, steps = system.grid.recording, len(system.grid.step)
         found = [one.value for one in self.program.run(trajectory.at_ends(), system.ends)]
         entering = [
-            Column(mine, term.into, np.asarray(series), term.source)
+            Column(mine, term.into, h.share(run) * np.asarray(series), term.source)
             for (h, mine, term), series in zip(self.terms, found, strict=False)
             if h.acts_in(run)
         ]
         # along the ends of the steps: what is held is held there, also for a memory of it
         first = np.minimum(2 * system.grid.read, 2 * steps - 1)  # of the step that a reading begins
         showing = [
-            (mine, system.grid.outputs.index(name), np.broadcast_to(series, (2 * steps,))[first])
+            (
+                mine,
+                system.grid.outputs.index(name),
+                h.share(run) * np.broadcast_to(series, (2 * steps,))[first],
+            )
             for (h, mine, name), series in zip(self.shown, found[len(self.terms) :], strict=True)
             if h.acts_in(run)
         ]

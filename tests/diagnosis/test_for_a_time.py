@@ -10,7 +10,7 @@ import pytest
 from discovery.diagnosis import diagnose
 from discovery.recordings import Recording
 from tests.diagnosis.parts import document
-from tests.machine import SIZES, Array, Concealed, Inputs, campaign, changed, model, simulated
+from tests.machine import SIZES, Array, Concealed, Inputs, campaign, changed, claims, model, simulated
 
 ON, OFF = 36000.0, 70000.0  # s
 
@@ -64,6 +64,27 @@ def test_something_cold_that_comes_to_a_body_is_no_jump_of_a_sensor() -> None:
     power, instant, constant = (p["value"] for p in one["parameters"].values())
     assert power * constant == pytest.approx(-400.0 * 900.0, rel=0.1)  # J
     assert instant == pytest.approx(ON, abs=900)
+
+
+def test_friction_that_ages_from_recording_to_recording() -> None:
+    """15 % more in each: no step explains it, and the third recording has twice as much as the second."""
+
+    def aged(k: int) -> Concealed:
+        return lambda _, __, u: (0.15 * k * SIZES["loss"] * u["P_drive"], 0.0, 0.0)
+
+    runs = [simulated(1 + k, hours=20.0, concealed=aged(k)) for k in range(3)]
+    (one,) = document(diagnose(model(), campaign(*runs), ["r1", "r2", "r3"]))["physics"]
+    assert (one["effect"], one["states"], one["recording"]) == ("wear", ["motor"], "r2")
+    assert one["grows"]
+    (each,) = one["parameters"].values()
+    assert each["value"] == pytest.approx(0.15, abs=0.02)
+
+
+def test_growth_is_no_step_and_two_recordings_show_none() -> None:
+    (grows,) = (h for h in claims(model(), "wear_growing", recordings=["r1", "r2", "r3"]))
+    assert [grows.share(run) for run in ("r1", "r2", "r3")] == [0.0, 1.0, 2.0]
+    assert grows.stated == "wear at motor from r2 on, more in each recording"
+    assert claims(model(), "wear_growing", recordings=["r1", "r2"]) == []
 
 
 def test_a_wrong_scale_is_named_in_its_recording() -> None:

@@ -130,19 +130,23 @@ def errors() -> Model:
     return Model("errors", parameters, states, terms, {}, "h")
 
 
-def scene(model: Model, channels: Mapping[str, Channel], odds: float = ODDS) -> Scene:
+def scene(
+    model: Model, channels: Mapping[str, Channel], odds: float = ODDS, runs: tuple[str, ...] = RUNS
+) -> Scene:
     """What candidates are made for: every input moves."""
     largest = {name: HIGH.get(name, 25.0) for name in channels if name not in READ}
-    after = {run: RUNS[k:] for k, run in enumerate(RUNS)}
+    after = {run: runs[k:] for k, run in enumerate(runs)}
     unused = frozenset(set(largest) - set(model.inputs))
     shown = tuple(name for name in READ if name in {*model.outputs, *model.states})
-    return Scene(channels, shown, RUNS, after, largest, unused, odds, EVENT_ODDS)
+    return Scene(channels, shown, runs, after, largest, unused, odds, EVENT_ODDS)
 
 
 def claims(model: Model, effect: Effect, channels: Mapping[str, Channel] = CHANNELS) -> list[Hypothesis]:
     """An effect at every place of a model, at every shape value that a search tries."""
     effect = replace(effect, shapes=tuple(s.within(0.5 * EVERY, LONG) for s in effect.shapes))
-    return [one for h in candidates(model, [effect], scene(model, channels)) for one in with_shapes(h)]
+    runs = (*RUNS, "three") if effect.grows else RUNS  # of two, growth is a step
+    seen = scene(model, channels, runs=runs)
+    return [one for h in candidates(model, [effect], seen) for one in with_shapes(h)]
 
 
 def machine_for(effect: Effect) -> Model:
