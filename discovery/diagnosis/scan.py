@@ -44,9 +44,7 @@ def scan_model(context: Context, current: Scored) -> Scan:
     offered = [h for h in offered if h.effect.search != "single readings"]
     settings = in_play(context, current)
     events = [h for h in offered if h.effect.search in ("window", "step")]
-    slabs = [context.slab([h]) for h in events]
-    # process noise that has absorbed an event shows neither when it came nor how fast
-    placed = [h for setting in settings for h in place_events(current.seen, setting, events, slabs)]
+    placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
     there = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
     moved = [one for h in there for one in shaped(h)]
     lasting = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
