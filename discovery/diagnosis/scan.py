@@ -15,7 +15,7 @@ from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.errors import RunsAwayError
 from discovery.evidence.bayes import Score, Without, scan
-from discovery.evidence.events import place_events, shaped
+from discovery.evidence.events import place_events
 from discovery.evidence.settings import AXES, Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened
@@ -46,7 +46,7 @@ def scan_model(context: Context, current: Scored) -> Scan:
     events = [h for h in offered if h.effect.search in ("window", "step")]
     placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
     there = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
-    moved = [one for h in there for one in shaped(h)]
+    moved = [one for h in there for one in with_shapes(h)]
     lasting = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
     every = [*lasting, *placed, *moved]
     own = [_without(current, h) for h in current.hypotheses]

@@ -14,7 +14,7 @@ from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict
 from discovery.fitting import Fit
 from discovery.printed import printed
 
-SMALL = "what acts besides is small: heat of any course at a body explains no more than it may by chance"
+SMALL = "what the model lacks is small: unknown heat at any body explains no more than it may by chance"
 
 
 def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Verdict:

@@ -78,13 +78,13 @@ def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hy
 
 
 def with_shapes(h: Hypothesis) -> list[Hypothesis]:
-    """A hypothesis at each of the shape values that a search integrates over."""
+    """A hypothesis at each of the shape values that a search integrates over; instants stay."""
     grids = [
-        [(name, value, weight) for value, weight in shape.values]
+        [(name, h.shapes[name], 0.0)] if shape.instant else [(name, *pair) for pair in shape.values]
         for name, shape in zip(h.shapes, h.effect.shapes, strict=True)
     ]
     return [
-        h.at({name: value for name, value, _ in point}, sum(weight for _, _, weight in point))
+        h.at({name: value for name, value, _ in point}, h.log_weight + sum(w for _, _, w in point))
         for point in product(*grids)
     ]
 

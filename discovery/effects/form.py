@@ -43,7 +43,7 @@ Place = Literal[
     "output next to others",  # one output of several
     "output that is a temperature",  # where an error would count from a zero of its own
     "input temperature",  # one recorded temperature, wherever the model uses it
-    "driving input",  # one recorded input that is none, wherever the model uses it
+    "driving input",  # one recorded input that is no temperature, wherever the model uses it
     "inputs of a recording",  # every input in one recording
     "recording",  # all errors of one recording, which a device shows: no thermometer is set to zero
 ]

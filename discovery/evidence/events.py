@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
+from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.bayes import Projected, Slab, project_one
 from discovery.evidence.outliers import MOST
@@ -161,7 +162,7 @@ class _Search:
         """At each of the shape values that a search integrates over: what comes at once and what comes slowly
         begin at other instants.
         """
-        return max((self._closest(one, slab) for one in shaped(h)), key=lambda found: found[0])[1]
+        return max((self._closest(one, slab) for one in with_shapes(h)), key=lambda found: found[0])[1]
 
     def _closest(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis]:
         """The hypothesis at the best instant near its present one, with its log Bayes factor."""
@@ -217,15 +218,6 @@ class _Search:
             dot, gram = (np.concatenate(one) for one in zip(*parts, strict=True))
             self.jumps[output] = dot, gram
         return self.jumps[output]
-
-
-def shaped(h: Hypothesis) -> list[Hypothesis]:
-    """A hypothesis at each of the values of its shapes that are no instants."""
-    found = [h]
-    for name, shape in zip(h.shapes, h.effect.shapes, strict=True):
-        if not shape.instant:
-            found = [one.at({name: v}, one.log_weight + w) for one in found for v, w in shape.values]
-    return found
 
 
 def _enough(*counts: NDArray[np.intp]) -> NDArray[np.bool_]:

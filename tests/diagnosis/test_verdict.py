@@ -949,7 +949,7 @@ def test_what_has_no_name_has_to_show_as_heat_at_a_body() -> None:
     nameless = Verdict("unexplained", cast(Any, WET.best), (), (), ("no effect is sure enough",))
     small_one = small(cast(Any, WET), nameless, -60.0)
     assert (small_one.word, small_one.named) == ("no mismatch", ())
-    assert small_one.reasons[0].startswith("what acts besides is small")
+    assert small_one.reasons[0].startswith("what the model lacks is small")
     assert small_one.reasons[-1] == "no effect is sure enough"
     assert small(cast(Any, WET), nameless, 40.0) is nameless
     coarse_one = Tried([replace(m, off=0.25) for m in WET.models])

@@ -20,7 +20,7 @@ EFFECT = Effect(
     shapes=(Shape("t_on", "s", 0.0, instant=True), Shape("t_off", "s", 1e9, instant=True)),
     signature="a body comes closer to the air for some hours of one recording, unrelated to any input",
     confused_with=("unmeasured_heat", "sensor_offset"),
-    source="forced convection has 10 to 50 W/(m2 K) where free convection has 2 to 10 (VDI Heat Atlas, A2)",
+    source="VDI Heat Atlas, F and G: forced convection of 10 to 50 W/(m2 K), free convection of 2 to 10",
     search="window",
     acts="in one recording",
     shared=True,

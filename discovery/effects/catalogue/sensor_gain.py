@@ -2,9 +2,9 @@
 
     error shown = (1 + gain) y    [um]
 
-gain of either sign, 0.02 to 0.2. Source: an eddy-current sensor that was set for another metal is off by up
-to some 20 % (ISO 230-3:2020 asks for a calibration against the target that is measured); a bridge amplifier
-with another gauge factor. Limits: found only next to a recording without it; the zero is that of the error.
+gain of either sign, 0.02 to 0.2. Source: data sheets of eddy-current sensors, which are set for one metal and
+are off by up to some 20 % on another; a bridge amplifier with another gauge factor. Limits: found only next
+to a recording without it; the zero is that of the error.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example
