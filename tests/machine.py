@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from discovery.effects.candidates import Scene, candidates
+from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.scene import Scene
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, names, parse

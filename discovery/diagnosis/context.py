@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.sizes import Sizes
 from discovery.dynamics import Grid, make_grid
-from discovery.effects.candidates import Scene, candidates
+from discovery.effects.candidates import candidates
 from discovery.effects.form import ROLE_OF, Effect
 from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.scene import Scene
 from discovery.evidence.bayes import Slab
 from discovery.evidence.form_error import are_others, model_form
 from discovery.evidence.late import perhaps_late

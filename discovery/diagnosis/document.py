@@ -125,8 +125,8 @@ def _claim(h: Hypothesis) -> _Claimed:
         "effect": h.effect.word,
         "states": list(h.places),
         "recording": h.recording,
-        "lasts": h.effect.acts == "from a recording on",
-        "grows": h.effect.grows,
+        "lasts": h.effect.lasts,
+        "grows": h.grows,
         "channels": list(h.follows),
     }
 

@@ -10,7 +10,8 @@ from math import log
 
 from discovery.effects.form import INPUT, LEVEL, OF_INPUTS, RATE, REPLACED, ROLE_OF, TERM, Effect
 from discovery.effects.hypothesis import BEFORE, Hypothesis
-from discovery.effects.places import TEMPERATURES, Spot, spots
+from discovery.effects.places import Spot, spots
+from discovery.effects.scene import Scene, channels_for, recordings_for
 from discovery.models import Model
 from discovery.models.model import TIME_UNITS
 from discovery.models.units import differences, dimension, ratio, same_dimension
@@ -33,27 +34,6 @@ from discovery.terms import (
 MEDIA = ("fluid", "coolant")  # whose exchange an input changes; without one, it is that with the air
 GONE = 3.0  # time constants after which less than a twentieth of a difference is left
 CAPACITIES = 3.0  # factor within which capacities are known: so much more than a power it may seem to heat
-
-
-@dataclass(frozen=True)
-class Scene:
-    """What candidates are made for.
-
-    `after`: by recording to fit, the recordings of the campaign that were made then or later, it included.
-    `largest`: the largest magnitude of each input that moves, over the recordings to fit.
-    `unused`: inputs that the model does not use. `odds` of each effect to act, `event_odds` of each event in
-    each recording. `spacing`: seconds between readings.
-    """
-
-    channels: Mapping[str, Channel]
-    outputs: tuple[str, ...]
-    recordings: tuple[str, ...]
-    after: Mapping[str, tuple[str, ...]]
-    largest: Mapping[str, float]
-    unused: frozenset[str]
-    odds: float
-    event_odds: float
-    spacing: float = 0.0
 
 
 def candidates(model: Model, effects: Sequence[Effect], scene: Scene) -> list[Hypothesis]:
@@ -95,15 +75,10 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
     used = names(parse(effect.formula, f"effect {effect.word}"))
     any_input = () if effect.place in OF_INPUTS else (INPUT, LEVEL, RATE)
     wanted = [variable for variable in (*ROLE_OF, *any_input) if variable in used]
-    choices = [_choices(variable, effect, model, scene) for variable in wanted]
+    choices = [channels_for(variable, effect, model, scene) for variable in wanted]
     own = (INPUT, LEVEL, *(MEDIA if effect.group == "inputs" else ()))
     in_name = [v in own or len(choice) > 1 for v, choice in zip(wanted, choices, strict=True)]
     order = sorted(range(len(wanted)), key=lambda k: wanted[k] not in (INPUT, LEVEL))  # what it follows first
-    runs: tuple[str | None, ...] = (None,) if effect.acts == "always" else scene.recordings
-    if effect.acts == "from a recording on" and effect.place != "input temperature":
-        runs = scene.recordings[1:]  # what is common to all recordings is the model's own parameter
-    if effect.grows:  # from the second one on; of two it is a step
-        runs = tuple(sorted(runs, key=lambda run: -len(scene.after[run or ""]))[:1]) if runs[1:] else ()
     for chosen in product(*choices):
         binding = {v: _bound(v, c, scene) for v, c in zip(wanted, chosen, strict=True)}
         if LEVEL in used and INPUT in used:
@@ -111,54 +86,15 @@ def _claims(effect: Effect, model: Model, scene: Scene) -> Iterator[Hypothesis]:
         for spot in spots(effect, model, scene.outputs, scene.channels):
             if {INPUT, LEVEL} & set(wanted) and _stands(chosen[-1], spot, model, effect):
                 continue
-            for run in runs:
+            for run, grows in recordings_for(effect, scene):
                 named = tuple(chosen[k] for k in order if in_name[k])
-                yield _claim(effect, model, spot, run, named, binding, scene)
+                yield _claim(effect, model, spot, run, grows, named, binding, scene)
 
 
 def _bound(variable: str, channel: str, scene: Scene) -> Expression:
     if variable not in (LEVEL, RATE):
         return Name(channel)
     return Apply("/", (Name(channel), Number(float(f"{scene.largest[channel]:.3g}"))))
-
-
-def _choices(variable: str, effect: Effect, model: Model, scene: Scene) -> list[str]:
-    """Channels that a variable of a formula may be."""
-    there = [n for n in scene.channels if n not in model.states and n not in model.outputs]
-    if variable in ROLE_OF:
-        fits = [n for n in there if scene.channels[n].role == ROLE_OF[variable]]
-        if variable == "flow":  # of several, those of the model wet it; another one is an input of its own
-            fits = [n for n in fits if n not in scene.unused] or fits
-        if variable == "other_input" and effect.amplitude.unit == "1":  # a share of it is heat
-            fits = [n for n in fits if same_dimension(scene.channels[n].unit, "W")]
-        return fits
-    if variable == RATE:
-        return [n for n in there if n in scene.largest and _is_flow(scene.channels[n])]
-    return [
-        n
-        for n in there
-        if n in scene.largest
-        and (variable == INPUT or scene.channels[n].unit not in TEMPERATURES)  # half of 20 degC is no level
-        and scene.channels[n].role in effect.roles
-        and (not effect.inputs_in or same_dimension(scene.channels[n].unit, effect.inputs_in))
-        and (
-            effect.place.startswith("output")
-            or scene.channels[n].role != "fluid flow"
-            or _is_second(n, scene)
-        )
-    ]
-
-
-def _is_flow(channel: Channel) -> bool:
-    return channel.role == "fluid flow" or same_dimension(channel.unit, "l/min")
-
-
-def _is_second(name: str, scene: Scene) -> bool:
-    """Whether a flow is not the one in the laws of the fluid: that one is in the model, or any flow if the
-    model is dry.
-    """
-    flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
-    return name in scene.unused and not scene.unused.issuperset(flows)
 
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
@@ -199,6 +135,7 @@ def _claim(
     model: Model,
     spot: Spot,
     run: str | None,
+    grows: bool,
     chosen: tuple[str, ...],
     binding: Mapping[str, Expression],
     scene: Scene,
@@ -206,7 +143,8 @@ def _claim(
     channels = (*chosen, *((spot.channel,) if spot.channel else ()))
     effect = _between_two(effect, model, spot, channels, scene)
     effect = _of_a_power(effect, model, spot, channels, scene)
-    naming = _naming(effect, model, spot, run, channels, binding, scene)
+    begins = (*((run,) if run else ()), *(("each",) if grows else ()))
+    naming = _naming(effect, model, spot, begins, channels, binding, scene)
     terms, shown = _changes(effect, model, spot, naming, scene)
     acting = () if run is None else (run,) if effect.is_event else scene.after[run]
     h = Hypothesis(
@@ -219,6 +157,7 @@ def _claim(
         run,
         acting,
         naming.switch,
+        grows,
         naming.shapes,
         channels,
     )
@@ -258,14 +197,14 @@ def _naming(
     effect: Effect,
     model: Model,
     spot: Spot,
-    run: str | None,
+    begins: tuple[str, ...],
     channels: tuple[str, ...],
     binding: Mapping[str, Expression],
     scene: Scene,
 ) -> _Naming:
     everywhere = spot.each or (spot.terms and len({t.into for t in spot.terms}) > 1)
     at = () if everywhere else spot.bodies or spot.outputs[: 1 if len(spot.outputs) == 1 else 0]
-    suffix = "_".join([*channels, *at, *((run,) if run else ())])
+    suffix = "_".join([*channels, *at, *begins])
     taken = {*model.parameters, *model.states, *scene.channels}
 
     def own(*parts: str) -> str:
@@ -280,7 +219,7 @@ def _naming(
     return _Naming(
         amplitudes,
         {names_of[s.name]: s.values[len(s.values) // 2][0] for s in effect.shapes},
-        own("acts") if run else "",
+        own("acts") if begins else "",
         {**binding, **{short: Name(full) for short, full in names_of.items()}},
     )
 

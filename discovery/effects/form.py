@@ -13,6 +13,8 @@ Group = Literal[
     "cutting fluid", "drive and cooling", "air and structure", "inputs", "measuring chain", "user"
 ]
 
+Acts = Literal["always", "in one recording", "from a recording on", "as parts age"]
+
 # Where an effect can act. A word per rule of `places.py`; nothing is offered where it cannot act.
 Place = Literal[
     "body",  # any body
@@ -216,8 +218,8 @@ class Effect:
     their channel becomes (the first of `REPLACED` that it names). For outputs `y` is the error without the
     effect. Where states have no capacity (phenomenological models) it is a rate.
 
-    `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, or from one on;
-    `grows`: in each recording from there on by as much more.
+    `search`: how its instants are found, if it has any; `acts`: in all recordings, in one, from one on, or as
+    parts age: from one on, or in each recording after the first one by as much more.
     `shared`: also offered at all its places at once, with one size. `spreads`: also offered at two linked
     bodies at once, with a size at each. `roles`: of the recorded inputs that its formula may follow, and
     `inputs_in` a unit of theirs, where it needs one; `unless`: of a recorded input that would say that it
@@ -235,8 +237,7 @@ class Effect:
     confused_with: tuple[str, ...] = ()
     shapes: tuple[Shape, ...] = ()
     search: Literal["shapes", "window", "step", "single readings"] = "shapes"
-    acts: Literal["always", "in one recording", "from a recording on"] = "always"
-    grows: bool = False
+    acts: Acts = "always"
     shared: bool = False
     spreads: bool = False
     roles: tuple[str, ...] = ()
@@ -253,6 +254,11 @@ class Effect:
     def is_event(self) -> bool:
         """Whether it belongs to one recording: it does not act in any other."""
         return self.acts == "in one recording"
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it stays once it has begun."""
+        return self.acts in ("from a recording on", "as parts age")
 
     @property
     def is_law(self) -> bool:

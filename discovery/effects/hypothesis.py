@@ -12,7 +12,7 @@ from discovery.printed import when
 from discovery.terms import Apply, Expression, Name, Term, names, substitute
 
 BEFORE = Name("what the output showed before")  # no channel has such a name
-Key = tuple[str, tuple[str, ...], tuple[str, ...], str | None, tuple[str, ...]]
+Key = tuple[str, tuple[str, ...], tuple[str, ...], str | None, bool, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class Hypothesis:
     recording: str | None = None
     acting: tuple[str, ...] = ()
     switch: str = ""
+    grows: bool = False
     shapes: Mapping[str, float] = field(default_factory=dict)  # parameter name -> value
     channels: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)  # parameter name -> unit at this place
@@ -44,7 +45,7 @@ class Hypothesis:
     @property
     def key(self) -> Key:
         """What the hypothesis claims, whatever its shape values."""
-        return (self.effect.word, self.states, self.outputs, self.recording, self.channels)
+        return self.effect.word, self.states, self.outputs, self.recording, self.grows, self.channels
 
     @property
     def places(self) -> tuple[str, ...]:
@@ -60,8 +61,7 @@ class Hypothesis:
     @property
     def stated(self) -> str:
         """The effect, where it acts, and the recording of an event."""
-        lasts = self.effect.acts == "from a recording on"
-        run = {"recording": self.recording, "lasts": lasts, "grows": self.effect.grows}
+        run = {"recording": self.recording, "lasts": self.effect.lasts, "grows": self.grows}
         event = f" {when(run)}" if self.recording and self.places else ""
         return f"{self.effect.word} at {self.where}{event}"
 
@@ -113,7 +113,7 @@ class Hypothesis:
 
     def share(self, recording: str) -> float:
         """How much of it acts in a recording: all or nothing, or one step more in each that follows."""
-        if not self.effect.grows or not self.acts_in(recording):
+        if not self.grows or not self.acts_in(recording):
             return float(self.acts_in(recording))
         return 1.0 + self.acting.index(recording)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discovery.effects.candidates import Scene, candidates
+from discovery.effects.candidates import candidates
 from discovery.effects.form import ROLE_OF, Effect
+from discovery.effects.scene import Scene
 from discovery.models import Model
 from discovery.terms import names, parse
 

@@ -17,6 +17,7 @@ from discovery.effects.form import (
     ROLE_OF,
     TERM,
     TERM_PLACES,
+    Acts,
     Amplitude,
     Effect,
     Place,
@@ -125,7 +126,7 @@ class EffectForm(Strict):
     sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
     shapes: dict[str, ShapeForm] = {}
     roles: list[Role] = Field([], description="of the inputs that `input` and `level` may be")
-    acts: Literal["always", "in one recording", "from a recording on"] | None = Field(
+    acts: Acts | None = Field(
         None, description="default: in one recording where its place or an instant says so, else always"
     )
     shared: bool = Field(False, description="also with one size at all its bodies at once")

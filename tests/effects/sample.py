@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory, make_grid, make_system, simulate
-from discovery.effects.candidates import Scene, candidates, with_shapes
+from discovery.effects.candidates import candidates, with_shapes
 from discovery.effects.catalogue import Effect
 from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.scene import Scene
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, names, parse
@@ -144,8 +145,7 @@ def scene(
 def claims(model: Model, effect: Effect, channels: Mapping[str, Channel] = CHANNELS) -> list[Hypothesis]:
     """An effect at every place of a model, at every shape value that a search tries."""
     effect = replace(effect, shapes=tuple(s.within(0.5 * EVERY, LONG) for s in effect.shapes))
-    runs = (*RUNS, "three") if effect.grows else RUNS  # of two, growth is a step
-    seen = scene(model, channels, runs=runs)
+    seen = scene(model, channels)
     return [one for h in candidates(model, [effect], seen) for one in with_shapes(h)]
 
 

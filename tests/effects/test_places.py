@@ -278,11 +278,18 @@ def test_an_input_changes_the_exchange_with_air_coolant_or_fluid() -> None:
 def test_what_begins_acts_in_the_recordings_that_were_made_later() -> None:
     model, channels = sample()
     three = replace(scene(model, channels), recordings=("a", "b"), after={"a": ("a", "c", "b"), "b": ("b",)})
-    (wear, *_) = candidates(model, [catalogue()["wear"]], replace(three, recordings=("b", "a")))
-    assert wear.recording == "a"
-    assert wear.acting == ("a", "c", "b")
+    (wear, *_) = found = candidates(model, [catalogue()["wear"]], three)
+    assert {h.recording for h in found} == {"b"}  # what is so from the first one on is the model's own
+    assert wear.acting == ("b",)
     switch = wear.added_to(model).parameters[wear.switch]
-    assert [switch.at(run) for run in ("a", "b", "c", "earlier")] == [1.0, 1.0, 1.0, 0.0]
+    assert [switch.at(run) for run in ("a", "b", "c", "earlier")] == [0.0, 1.0, 0.0, 0.0]
+
+
+def test_the_first_recording_is_the_oldest_one_not_the_first_in_the_list() -> None:
+    model, channels = sample()
+    after = {"a": ("a", "c", "b"), "b": ("b",)}
+    seen = replace(scene(model, channels), recordings=("b", "a"), after=after)
+    assert {h.recording for h in candidates(model, [catalogue()["wear"]], seen)} == {"b"}
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,11 @@ import pytest
 from scipy.stats import norm
 
 from discovery.dynamics import make_grid
-from discovery.effects.candidates import Scene, candidates
+from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Shape
 from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.scene import Scene
 from discovery.evidence.bayes import Slab, project, project_one, scan
 from discovery.evidence.events import LEAST, _span, event_steps, heat_steps, place_events
 from discovery.evidence.settings import Setting

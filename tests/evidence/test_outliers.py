@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from discovery.dynamics import make_grid
-from discovery.effects.candidates import Scene, candidates
+from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
+from discovery.effects.scene import Scene
 from discovery.evidence.outliers import find_outliers
 from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
