@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
 from discovery.virtual.machine import Machine
 from discovery.virtual.materials import Share
-from discovery.virtual.network import Array, Form, Gate, Inputs, Law
+from discovery.virtual.network import Array, Form, Gate, Inputs, Law, times
 from discovery.virtual.signals import Draw
 
 Place = tuple[str, ...]
@@ -120,3 +120,18 @@ def speed_power(machine: Machine, exponent: float) -> Callable[[Inputs], Array]:
 def minutes(machine: Machine, at_72_h: float) -> float:
     """A time constant [s] in proportion to the length of a recording, given in minutes for 72 h."""
     return at_72_h * 60.0 * machine.pace.hours / 72.0
+
+
+def aged(machine: Machine, names: Collection[str], size: float, shapes: Shapes) -> Machine:
+    """Exchanges that are less by a share `size` after the first recording, and less of what is left after
+    each further one, faster or slower than before.
+    """
+    power = shapes("power", 0.6, 1.0, 1.4)
+
+    def lost(u: Inputs) -> Array:
+        return np.asarray((1.0 - size) ** u["age"] ** power)
+
+    def change(law: Law) -> Law:
+        return replace(law, gate=times(law.gate, lost)) if law.name in names else law
+
+    return replace(machine, network=machine.network.changed(change))

@@ -11,6 +11,7 @@ from discovery.virtual.effects.effect import (
     Effect,
     Place,
     Shapes,
+    aged,
     around,
     conductance,
     each,
@@ -81,6 +82,16 @@ def _contact(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
         return replace(law, form=Form.CONTACT, shape=shape)
 
     return replace(m, network=m.network.changed(change))
+
+
+def _loosening(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
+    """A joint whose screws settle."""
+    return aged(m, {f"{at[0]}-{at[1]}", f"{at[1]}-{at[0]}"}, size, shapes)
+
+
+def _fouling(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
+    """Dust on a surface that the air cools."""
+    return aged(m, {f"air {at[0]}"}, size, shapes)
 
 
 def _joint(m: Machine, at: Place, size: float, shapes: Shapes) -> Machine:
@@ -193,6 +204,22 @@ STRUCTURE = (
         lambda m: list(m.joints),
         number(0.9),
         _contact,
+    ),
+    Effect(
+        "joint_loosening",
+        "1",
+        "the joint conducts less by a share size from one recording to the next",
+        lambda m: list(m.joints),
+        number(0.6),
+        _loosening,
+    ),
+    Effect(
+        "air_fouling",
+        "1",
+        "the air takes less by a share size from one recording to the next",
+        lambda m: each(tuple(m.air)),
+        number(0.6),
+        _fouling,
     ),
     Effect(
         "joint_hysteresis",
