@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import series
 from discovery.dynamics.averaging import Means, as_readings_show, averaged, independent, some_of
+from discovery.dynamics.gaps import unknown_in_gaps
 from discovery.dynamics.samples import Samples, read_samples
 from discovery.recordings import Campaign, Recording
 from discovery.recordings.blocks import block_means
@@ -49,6 +50,7 @@ class Grid:
     unsure: Mapping[str, float] = field(default_factory=dict)  # s, of channels perhaps logged late
     late: Mapping[str, float] = field(default_factory=dict)  # s, which `ends` has them earlier than stamped
     noisy: Mapping[str, Samples] = field(default_factory=dict)  # noise of channels: its sd, per root of Hz
+    silent: Mapping[str, Samples] = field(default_factory=dict)  # the same of channels with gaps, in these
     instants: int = 0  # nodes that there were before it was coarsened; 0: it was not
     logged: Mapping[str, float] = field(default_factory=dict)  # s, median distance of the stamps of a channel
     means: Means | None = None  # where readings are means of several
@@ -280,6 +282,8 @@ def make_grid(
     usual = float(np.median(np.diff(data.time[rows]))) if len(rows) > 1 else 0.0
     max_step = max(LONGEST_STEP, usual / STEPS)
     stamped = Grid(recording, data.time[rows], samples, outputs, read, table[taken], spread, logged=logged)
+    unknown = {name: unknown_in_gaps(one) for name, one in samples.items()}
+    stamped = replace(stamped, silent={name: one for name, one in unknown.items() if one})
     if len(rows) > most:
         if coarse is None:
             coarse = max(COARSE_NODES, round(float(np.ptp(data.time)) / LONGEST_BLOCK))

@@ -26,7 +26,7 @@ from discovery.dynamics import Trajectory
 from discovery.dynamics.kernel import between, copy, driven, product
 from discovery.dynamics.prediction import output_matrix
 from discovery.dynamics.trajectory import flows
-from discovery.fitting.impulses import added, late_switches, noisy_inputs
+from discovery.fitting.impulses import added, inputs_in_gaps, late_switches, noisy_inputs
 from discovery.fitting.noise import Noise
 
 Array = NDArray[np.float64]
@@ -205,6 +205,11 @@ class Filter:
         """The same for noise of inputs as large as they are rough."""
         return noisy_inputs(self.trajectory)
 
+    @cached_property
+    def silent(self) -> Array:
+        """The same for what inputs may have done while they were not recorded."""
+        return inputs_in_gaps(self.trajectory)
+
     def gains(self, noise: Noise) -> tuple[Array, Array]:
         """What `_gains` gives under a noise. The last one is kept: a residual and its sensitivities, or the
         columns of one search after another, are whitened alike.
@@ -225,7 +230,8 @@ class Filter:
         return found
 
     def _jumps(self, noise: Noise) -> Array:
-        return added([(noise.jitter, lambda: self.late), (noise.rough, lambda: self.noisy)])
+        always = (1.0, lambda: self.silent)
+        return added([(noise.jitter, lambda: self.late), (noise.rough, lambda: self.noisy), always])
 
     def _parts(self, noise: Noise) -> _Parts:
         if "parts" not in self.last or self.last["parts"][0] != noise:
@@ -252,13 +258,18 @@ class Filter:
         """Columns (measured readings, M) of data (R, Y, M), whitened, and the logarithm (measured readings,)
         of the standard deviation of each innovation.
         """
-        if noise.is_white:
+        if is_white(self.trajectory, noise):
             white = self.trajectory.system.grid.sd(noise.white)[self.measured]
             return data[self.measured] / white[:, None], np.log(white)
         one, (gains, roots) = self._parts(noise), self.gains(noise)
         columns = np.ascontiguousarray(data)
         out = _whitened(one.ways, one.decays, self.h, self.measured, gains, roots, one.slow, columns)
         return out, np.log(roots[self.measured])
+
+
+def is_white(trajectory: Trajectory, noise: Noise) -> bool:
+    """Whether whitening is a plain division."""
+    return noise.is_white and not trajectory.system.grid.silent
 
 
 def make_filter(trajectory: Trajectory) -> Filter:
@@ -279,7 +290,7 @@ def whiten(trajectory: Trajectory, noise: Noise, data: Array, part: Filter | Non
     """Whitened columns (measured readings, M) of data (R, Y, M); `part`: filter of the trajectory, where it
     was made before.
     """
-    if noise.is_white:
+    if is_white(trajectory, noise):
         grid = trajectory.system.grid
         return np.asarray(data[grid.measured] / grid.sd(noise.white)[grid.measured][:, None])
     return (part or make_filter(trajectory)).whitened(noise, data)[0]

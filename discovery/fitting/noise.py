@@ -40,7 +40,7 @@ class Noise:
 
     @property
     def is_white(self) -> bool:
-        """Whether whitening is a plain division."""
+        """Whether it is nothing but reading noise."""
         return not (any(self.slow) or any((self.heat or {}).values()) or self.jitter or self.rough)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Trajectory
 from discovery.errors import RunsAwayError
-from discovery.fitting.kalman import Filter, make_filter, whiten
+from discovery.fitting.kalman import Filter, is_white, make_filter, whiten
 from discovery.fitting.noise import Noise
 from discovery.fitting.problem import Problem
 
@@ -141,7 +141,7 @@ def solve(
         if gained > 0.5 * expected:
             damping = max(damping * _EASE, 1e-12)
         done = gained < tolerance * cost
-        if gained > _FAR and not noise.is_white:
+        if gained > _FAR and any(filters):
             filters = _filters(now.trajectories, noise)
             now = _whitened(problem, x, noise, together, now.trajectories, filters)
         cost = _cost(now.residual, loss)
@@ -168,7 +168,7 @@ def free_runs(problem: Problem, x: Array, near: tuple[Trajectory, ...] = ()) -> 
 
 
 def _filters(trajectories: tuple[Trajectory, ...], noise: Noise) -> Filters:
-    return tuple(None if noise.is_white else make_filter(t) for t in trajectories)
+    return tuple(None if is_white(t, noise) else make_filter(t) for t in trajectories)
 
 
 def _whitened(

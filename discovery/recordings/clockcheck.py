@@ -38,7 +38,7 @@ def clock_findings(file: Path, columns: Columns, *, pauses: bool = False) -> lis
     usual = float(np.median(forward)) if forward.size else 0.0
     if (jumps := np.flatnonzero(steps > _JUMP * usual)).size and usual > 0 and not pauses:
         what = f"time jumps by {steps[jumps[0]]:g} s where steps are {usual:g} s{more(jumps.size)}"
-        do = "nothing is known of the gap: split the recording there if the machine did not stand still"
+        do = "nothing is known of the gap: fits allow for what inputs did; split the recording if it is long"
         findings.append(Finding("warning", file, int(columns.lines[jumps[0] + 1]), what, do))
     if columns.origin is None and usual > 0:
         findings += _unit_findings(file, columns, usual)

@@ -1,0 +1,57 @@
+"""What an input may have done while nobody recorded it.
+
+A held input stands at its last value through a gap, another one runs straight. In truth it went on moving as
+it does elsewhere. In the middle of a gap of length G it is off by what it moves within G/2, or by how far it
+is from a straight line over G, on average over the recording (structure function; Yaglom, Correlation Theory
+of Stationary and Related Random Functions, 1987):
+
+    D = mean of (u(t + G/2) - u(t))^2,   or of (u(t + G/2) - (u(t) + u(t + G))/2)^2
+
+Its integral over the gap then has the standard deviation G sqrt(D), as white noise of the spectral density
+G D.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discovery.dynamics.samples import Samples
+
+Array = NDArray[np.float64]
+
+MISSED = 3.0  # usual steps: a longer one is a gap
+REGULAR = 0.9  # of the steps are usual ones, or the channel is written when it changes
+_ENOUGH = 4000  # instants at which a structure function is taken
+
+
+def unknown_in_gaps(samples: Samples) -> Samples | None:
+    """How unsure a channel is in its gaps, as the root of a spectral density, in its unit per root of Hz, and
+    zero elsewhere; None where it has no gap, or does not move.
+
+    >>> time = np.append(60.0 * np.arange(20), 2340.0)  # 20 min are not recorded
+    >>> power = Samples(time, np.arange(21.0) % 2, False)
+    >>> unknown = unknown_in_gaps(power)
+    >>> float(unknown.at(600.0)), float(unknown.at(1500.0)) > 0
+    (0.0, True)
+    """
+    step = np.diff(samples.time)
+    if step.size < 2 or not np.ptp(samples.value) > 0:
+        return None
+    usual = float(np.median(step))
+    gaps = np.flatnonzero(step > MISSED * usual)
+    if not gaps.size or np.mean(step <= MISSED * usual) < REGULAR:
+        return None
+    size = np.zeros(len(samples.time))
+    for k in gaps:
+        size[k] = np.sqrt(step[k] * _apart(samples, float(step[k])))
+    return Samples(samples.time, size, False)
+
+
+def _apart(samples: Samples, gap: float) -> float:
+    """Mean square by which a channel is off in the middle of a gap."""
+    begin, end = float(samples.time[0]), float(samples.time[-1])
+    half = min(gap / 2, (end - begin) / 3)
+    time = np.linspace(begin, end - 2 * half, _ENOUGH)
+    first, middle, last = (samples.at(time + by) for by in (0.0, half, 2 * half))
+    return float(np.mean((middle - (0.5 * (first + last) if samples.linear else first)) ** 2))
