@@ -143,6 +143,8 @@ def unit_in(header: str) -> tuple[str, str] | None:
     (('time', 'h'), None, ('q', 'W/m2'))
     >>> unit_in("oil_C"), unit_in("coolant_flow_C"), unit_in("hall_A")
     (('oil', 'C'), None, None)
+    >>> unit_in("T_f"), unit_in("T_F"), unit_in("temp_f")
+    (None, ('T', 'F'), ('temp', 'f'))
     >>> unit_in("oil_in"), unit_in("T_in"), unit_in("Disp X in"), unit_in("x [in]")
     (None, None, ('Disp X', 'in'), ('x', 'in'))
     >>> unit_in("solarrad_Wm2"), unit_in("relhum_perc")
@@ -203,6 +205,8 @@ def _belongs(name: str, unit: str) -> bool:
     `Data/ora` and `Fecha y hora` are the date and the time of day.
     """
     if time_unit(unit) and (is_dated(name) or not CLOCKS.search(fold(name))):
+        return False
+    if re.fullmatch("[A-Z]", name) and re.fullmatch("[a-z]", unit):  # T_f: a fluid, not degF
         return False
     if (len(unit) > 1 and unit.casefold() != "in") or unit in "%°":  # an inlet is more common than an inch
         return True
