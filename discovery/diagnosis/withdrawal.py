@@ -34,16 +34,23 @@ def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Ve
 
 def small(found: Search, verdict: Verdict, free_heat: float) -> Verdict:
     """No mismatch where no effect has a name and free heat at no body explains more than it may by chance:
-    evidence of a law that is a little wrong grows with every reading, however little it matters. What free
-    runs miss is asked next.
+    evidence of a law that is a little wrong grows with every reading, however little it matters. A fault of
+    the measuring chain, or what happened in one recording, is no such law. What free runs miss is asked next.
 
     Args:
         free_heat: log evidence of heat of any course at the body where it explains most.
     """
-    if verdict.word != UNEXPLAINED or verdict.named or coarse(found) or free_heat > 0:
+    least = max(free_heat, _beyond_laws(found))
+    if verdict.word != UNEXPLAINED or verdict.named or coarse(found) or least > 0:
         return verdict
     reasons = (SMALL, *unrecorded(found), *verdict.reasons)
     return replace(verdict, word=NO_MISMATCH, candidates=(), reasons=reasons)
+
+
+def _beyond_laws(found: Search) -> float:
+    """Log evidence that faults and events add to laws, beyond what a name needs."""
+    laws = [one for one in found.tried.values() if all(h.effect.is_law for h in one.hypotheses)]
+    return found.best.evidence - max(one.evidence for one in laws) - thresholds.SHORT
 
 
 def _acts(verdict: Verdict, run: str) -> bool:

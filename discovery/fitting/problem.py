@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 FORMER = 2  # recordings as which the spread of starts that was believed before counts
 MOST = 2.0  # of what is expected, the most that an input is logged late
 FARTHEST = 1e6  # times its start that a parameter may go: no recording shows more, and the arithmetic fails
+UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
 
 
 class Prior(NamedTuple):
@@ -282,8 +283,10 @@ def _parameter(
 ) -> Unknown:
     is_log = bool(prior and prior.is_log)
     low = max(p.min, 1e-12) if is_log else p.min
-    known = (prior.mean, prior.sd) if prior else p.prior
     start = p.at(recording or "")
+    known = (prior.mean, prior.sd) if prior else p.prior
+    if known is None and p.unit == "degC":
+        known = start, UNREAD
     reach = FARTHEST * abs(start) or np.inf
     low, high = max(low, -reach), min(p.max, reach)
     return Unknown(name, recording, False, start, low, high, known, is_log, belief)

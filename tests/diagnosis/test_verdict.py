@@ -958,6 +958,14 @@ def test_what_has_no_name_has_to_show_as_heat_at_a_body() -> None:
     assert small(cast(Any, WET), named, -60.0) is named
 
 
+@pytest.mark.parametrize(("gain", "is_small"), [(78.0, False), (12.0, True)])
+def test_a_jump_of_a_sensor_is_no_law_that_is_a_little_wrong(gain: float, is_small: bool) -> None:
+    """No heat makes it, so none shows at a body."""
+    jump = Tried([Model((claim("sensor_offset", "E_Z"),), gain), Model((), 0.0)])
+    nameless = Verdict("unexplained", cast(Any, jump.best), (), (), ("no effect is sure enough",))
+    assert (small(cast(Any, jump), nameless, -60.0) is not nameless) == is_small
+
+
 def fitted(name: str, value: float, bounds: tuple[float, float]) -> Fit:
     """A fit as far as a shape at the end of its range is asked of it."""
     problem = SimpleNamespace(

@@ -234,3 +234,17 @@ def test_the_starts_of_bodies_that_one_recording_shows_share_what_it_knows() -> 
             assert fit.model.states[name].start_sd == pytest.approx(
                 np.sqrt((2 * expected + count * alone[name] ** 2) / (2 + count))
             )
+
+
+def test_a_temperature_that_nobody_reads_stays_near_what_its_author_believes() -> None:
+    """A loss to a cellar that is too small to be seen: its heat shows at most, and not how cold it is."""
+    rng = np.random.default_rng(3)
+    terms = (*model().terms, Term("cellar", "T", parse("k*(T_c - T)")))
+    parameters = {**model().parameters, "T_c": Parameter(8.0, "degC"), "k": Parameter(1e-6, "1/s", 0.0)}
+    below = replace(model(), terms=terms, parameters=parameters)
+    fit = fit_model(below, campaign(cold(rng, "a", 0.0), cold(rng, "b", 0.0)), ["a", "b"])
+    cellar = fit.model.parameters["T_c"]
+    assert cellar.value == pytest.approx(8.0, abs=20.0)
+    assert cellar.low is not None
+    assert cellar.high is not None
+    assert 20.0 < cellar.high - cellar.low < 45.0  # as wide as what was believed
