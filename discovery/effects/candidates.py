@@ -288,7 +288,8 @@ def _changed(
     """
     known = naming.sized(effect)
     if TERM in names(formula):
-        ends = {"body": Name(term.into), **({"other": Name(term.source)} if term.source else {})}
+        other = term.source or next((b for b in spot.bodies if b != term.into), None)
+        ends = {"body": Name(term.into), **({"other": Name(other)} if other else {})}
         change = substitute(formula, {**known, TERM: term.expression, **ends})
         return Term(f"{effect.title}: {term.name}", term.into, change, term.source, effect.word)
     if effect.place == "inputs of a recording":

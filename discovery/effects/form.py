@@ -31,6 +31,7 @@ Place = Literal[
     "cooling terms",  # terms in which the cooling power stands
     "current terms",  # terms in which an electric current stands
     "loss terms",  # at each body laws of the speed, or else terms of a heat load or another input
+    "loss terms and a neighbour",  # the loss terms that enter one body, and a body that is linked to it
     "air terms",  # terms in which the ambient temperature stands
     "heat of a body",  # the loss terms that enter one body
     "error state",  # a state that is an error: its terms are rates
@@ -55,6 +56,7 @@ TERM_PLACES = (
     "cooling terms",
     "current terms",
     "loss terms",
+    "loss terms and a neighbour",
     "heat of a body",
     "air terms",
     "input temperature",
@@ -91,6 +93,8 @@ DRIVING = (  # roles of the inputs that an error may follow by a law of its own
     "nozzle side",
     "other input",
 )
+
+ALL = 1.25  # the most of a share: all of it, and as much more as the flow that it is a share of may be off
 
 _PER_SPEED = r"(\bspeed\s*/\s*)(\d+(?:\.\d+)?)"  # at which speed the size of an effect counts
 _REACH = 2.0  # standard deviations of a prior that a search covers

@@ -16,6 +16,7 @@ _FED = {  # roles of which a place needs one: of bodies or terms that the model 
     "driven body": ("heat load", "rotation speed"),
     "driven and another": ("heat load", "rotation speed"),
     "loss terms": ("heat load", "rotation speed", "other input"),
+    "loss terms and a neighbour": ("heat load", "rotation speed", "other input"),
     "heat of a body": ("heat load", "rotation speed", "other input"),
     "air body": ("ambient temperature",),
     "air terms": ("ambient temperature",),

@@ -121,7 +121,7 @@ class EffectForm(Strict):
         inf,
         gt=0,
         allow_inf_nan=True,
-        description="largest size that is physical, 1 for a share; default no limit",
+        description="largest size that is physical, 1.25 for a share that may be all; default no limit",
     )
     sign: Literal[-1, 0, 1] = Field(1, description="sign of the amplitude, 0 where physics leaves it open")
     shapes: dict[str, ShapeForm] = {}

@@ -13,6 +13,14 @@ from discovery.recordings import Channel
 from discovery.terms import Name, Term, names, parse
 
 TEMPERATURES = ("degC", "K")
+OF_TERMS = {  # places that are terms: the role of a channel that stands in them
+    "fluid terms": "fluid temperature",
+    "coolant terms": "coolant temperature",
+    "cooling terms": "cooling power",
+    "loss terms": "heat load",
+    "loss terms and a neighbour": "heat load",
+    "air terms": "ambient temperature",
+}
 
 
 @dataclass(frozen=True)
@@ -93,9 +101,7 @@ def spots(
         case "current terms":
             currents = {n for n, c in channels.items() if same_dimension(c.unit, "A")}
             yield from _of(tuple(t for t in parts.own if names(t.expression) & currents))
-        case (
-            "fluid terms" | "coolant terms" | "cooling terms" | "loss terms" | "air terms" | "heat of a body"
-        ):
+        case place if place in OF_TERMS or place == "heat of a body":
             yield from _of_terms(effect, model, parts, role)
         case "input temperature" | "driving input":
             yield from _of_inputs(effect, model, parts, channels)
@@ -190,15 +196,16 @@ def _of_terms(effect: Effect, model: Model, parts: Layout, role: Mapping[str, st
         for body in dict.fromkeys(t.into for t in heats):
             yield Spot((body,), tuple(t for t in heats if t.into == body))
         return
-    wanted = {
-        "fluid terms": "fluid temperature",
-        "coolant terms": "coolant temperature",
-        "cooling terms": "cooling power",
-        "loss terms": "heat load",
-        "air terms": "ambient temperature",
-    }[effect.place]
+    wanted = OF_TERMS[effect.place]
     every = tuple(t for t in parts.own if _holds(t, wanted, role))
-    yield from _of(_losses(model, parts, role) if wanted == "heat load" else every)
+    found = _of(_losses(model, parts, role) if wanted == "heat load" else every)
+    if effect.place != "loss terms and a neighbour":
+        yield from found
+        return
+    for spot in found:
+        if len(spot.bodies) == 1:
+            near = (b for b in parts.bodies if frozenset((*spot.bodies, b)) in parts.links)
+            yield from (Spot((*spot.bodies, b), spot.terms) for b in near)
 
 
 def _losses(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, ...]:

@@ -419,3 +419,29 @@ def test_only_an_effect_that_may_follow_several_inputs_names_its_input() -> None
     path = expand(catalogue()["input_path"])
     assert {h.where for h in path} >= {"E_Y from cut", "E_Z from rpm"}
     assert all(" from " not in h.where for h in expand(catalogue()["fluid_convection"]))
+
+
+def test_friction_answers_to_the_oil_next_to_its_body() -> None:
+    """The table turns in the oil of the bed, which is read: 100 W at 22 degC, exp(-0.3) of it at 32."""
+    model, channels = sample()
+    found = claims(model, catalogue()["viscosity_friction_neighbour"], channels)
+    linked = {frozenset((t.into, t.source)) for t in model.terms if t.source}
+    assert {frozenset(h.states) for h in found} <= linked
+    (one, *_) = (h for h in found if h.states[0] == "table")
+    (body, oil), (term, *_) = one.states, one.terms
+    known = dict.fromkeys(names(term.expression), 1.0) | {one.amplitudes[0]: 1.0, body: 90.0}
+    (k,) = one.shapes
+
+    def heat(at: float) -> float:
+        return float(evaluate(term.expression, {**known, k: 0.03, oil: at}).value)
+
+    assert heat(22.0) == 0.0
+    assert heat(32.0) / heat(42.0) == pytest.approx((np.exp(-0.3) - 1) / (np.exp(-0.6) - 1))
+
+
+@pytest.mark.parametrize(
+    "word", ["input_missed", "displaced_jet_missed", "joint_hysteresis", "copper_resistance_current"]
+)
+def test_a_share_of_all_is_no_end_of_its_range(word: str) -> None:
+    """A fit that ends at a bound has no size: a pump that ran dry was lost, and heat took its place."""
+    assert catalogue()[word].amplitude.ends[1] > 1.0

@@ -7,7 +7,7 @@ degC. Limits: the winding is as warm as the body; almost always invisible (4 % o
 K).
 """
 
-from discovery.effects.form import Amplitude, Effect, Example
+from discovery.effects.form import ALL, Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="copper_resistance",
@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="drive and cooling",
     place="driven body",
     formula="R_cu*0.00393*load*(body - 22)",
-    amplitude=Amplitude("R_cu", "1", 0.3, most=1.0),
+    amplitude=Amplitude("R_cu", "1", 0.3, most=ALL),
     signature="drive losses grow 4 % per 10 K; almost always invisible",
     confused_with=("thermal_preload",),
     source="temperature coefficient of copper 0.00393/K on the copper share of the drive losses",

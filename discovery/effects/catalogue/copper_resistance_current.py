@@ -7,7 +7,7 @@ q_I is what the current makes flow in the model at 22 degC, R_cu the share of it
 body.
 """
 
-from discovery.effects.form import Amplitude, Effect, Example
+from discovery.effects.form import ALL, Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="copper_resistance",
@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="drive and cooling",
     place="current terms",
     formula="R_cu*0.00393*(body - 22)*term",
-    amplitude=Amplitude("R_cu", "1", 0.8, most=1.0),
+    amplitude=Amplitude("R_cu", "1", 0.8, most=ALL),
     signature="the heat of a current grows 4 % per 10 K of the winding",
     confused_with=("input_exchange", "input_heat"),
     source="temperature coefficient of copper 0.00393/K on the copper share of the losses of a current",

@@ -9,7 +9,7 @@ cooling; Liu, Lienhard, Lombara, J. Heat Transfer 113, 1991). Limits: in proport
 hits instead is a law of its own (`displaced_jet`).
 """
 
-from discovery.effects.form import Amplitude, Effect, Example
+from discovery.effects.form import ALL, Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="displaced_jet",
@@ -17,7 +17,7 @@ EFFECT = Effect(
     group="cutting fluid",
     place="fluid terms",
     formula="-share*level*term",
-    amplitude=Amplitude("share", "1", 0.5, most=1.0),
+    amplitude=Amplitude("share", "1", 0.5, most=ALL),
     signature="wet bodies follow the fluid less while the nozzle points aside",
     confused_with=("fluid_convection_flow", "rim_detachment", "input_exchange"),
     source="Liu, Lienhard, Lombara 1991: the heat flow of a jet follows the fluid that feeds it",

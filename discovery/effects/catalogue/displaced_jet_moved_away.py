@@ -7,7 +7,7 @@ q_fluid is what the fluid brings in the model; share: 1 where the jet misses the
 recordings share is the model's own parameter.
 """
 
-from discovery.effects.form import Amplitude, Effect, Example
+from discovery.effects.form import ALL, Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="displaced_jet",
@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="cutting fluid",
     place="fluid terms",
     formula="-share*term",
-    amplitude=Amplitude("share", "1", 0.5, most=1.0),
+    amplitude=Amplitude("share", "1", 0.5, most=ALL),
     signature="wet bodies follow the fluid less from a recording on, or in each recording",
     confused_with=("fluid_convection_flow", "wear"),
     source="Liu, Lienhard, Lombara 1991: the heat flow of a jet follows the fluid that feeds it",

@@ -7,7 +7,7 @@ is what it asked for. Limits: constant within its window; inputs that are temper
 comes again and again has a cause to look for, and the verdict is `unexplained`.
 """
 
-from discovery.effects.form import Amplitude, Effect, Example, Shape
+from discovery.effects.form import ALL, Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="input_missed",
@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="measuring chain",
     place="driving input",
     formula="input*(1 - where(time >= t_on, 1, 0)*where(time < t_off, 1, 0))",
-    amplitude=Amplitude("missed", "1", 0.8, 1, most=1.0),
+    amplitude=Amplitude("missed", "1", 0.8, 1, most=ALL),
     shapes=(Shape("t_on", "s", 0.0, instant=True), Shape("t_off", "s", 1e9, instant=True)),
     signature="for some hours of one recording every body goes on as if an input were off",
     confused_with=("unmeasured_heat", "draught", "sensor_offset"),

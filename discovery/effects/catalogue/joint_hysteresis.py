@@ -7,7 +7,7 @@ machine tools, up to some 25 where long or light parts slide (extruder, printer)
 play operator. Limits: one width; the same at any rate, starts in the middle of its play.
 """
 
-from discovery.effects.form import Amplitude, Effect, Example, Shape
+from discovery.effects.form import ALL, Amplitude, Effect, Example, Shape
 
 EFFECT = Effect(
     word="joint_hysteresis",
@@ -15,7 +15,7 @@ EFFECT = Effect(
     group="air and structure",
     place="output that is no temperature",
     formula="slip*(play(y, width) - y)",
-    amplitude=Amplitude("slip", "1", 0.5, most=1.0),
+    amplitude=Amplitude("slip", "1", 0.5, most=ALL),
     shapes=(Shape("width", "um", 2.0, factor=3.5),),
     signature="a plateau at every reversal, the same at any rate",
     confused_with=("sensor_lag",),
