@@ -47,6 +47,14 @@ class Posterior:
         """The most likely model, also among those with heat of unknown cause."""
         return max(self.models, key=lambda m: m.evidence)
 
+    def instead(self, one: Scored) -> Scored:
+        """The most likely model with as many effects as one that was tried, over all widths of the priors."""
+        level = np.median(self.evidence, axis=1)
+        alike = [
+            k for k, m in enumerate(self.models) if len(m.hypotheses) == len(one.hypotheses) and not m.forced
+        ]
+        return self.models[max(alike, key=lambda k: level[k])] if alike else one
+
     @property
     def shares(self) -> Array:
         """(M,) share of each model among those that were tried."""

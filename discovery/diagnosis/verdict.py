@@ -46,7 +46,7 @@ class Verdict:
 
 def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     """What the recordings to fit say."""
-    answer = found.best
+    answer = posterior.instead(found.best)
     candidates = tuple(
         sorted(
             (one_named(found, posterior, answer, h) for h in answer.hypotheses),

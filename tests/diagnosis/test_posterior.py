@@ -53,6 +53,14 @@ def sigmoid(x: float) -> float:
     return float(1 / (1 + np.exp(-x)))
 
 
+def test_of_rivals_the_one_that_is_more_likely_over_all_widths_is_the_answer() -> None:
+    """At the stated width the fluid is; an answer that is 1 % sure was named first, before one of 97 %."""
+    fluid, lag, both = Known((FLUID,), 5.0), Known((LAG,), 4.0), Known((FLUID, LAG), 9.0)
+    found = known(fluid, lag, both, draws=np.array([[1.0, 2.0], [5.0, 6.0], [9.0, 9.0]]))
+    assert found.instead(cast(Scored, fluid)).hypotheses == lag.hypotheses
+    assert found.instead(cast(Scored, both)).hypotheses == both.hypotheses
+
+
 def test_a_claim_is_as_likely_as_its_odds_say_on_average_over_draws() -> None:
     found = known(Known((FLUID,)), Known(()), draws=np.array([[4.0, 2.0, -1.0], [1.0, 2.0, 1.0]]))
     expected = np.mean([sigmoid(3.0), sigmoid(0.0), sigmoid(-2.0)])

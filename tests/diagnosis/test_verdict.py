@@ -123,6 +123,9 @@ class Believed:
     def best(self) -> Model:
         return max(self.models, key=lambda m: m.evidence)
 
+    def instead(self, one: Model) -> Model:
+        return one
+
     def of_claims(self, several: Sequence[Hypothesis]) -> float:
         return sum(self.words[word] for word in {h.effect.word for h in several})
 
