@@ -255,7 +255,8 @@ def _short(apply: Apply) -> Expression | None:
 
 
 def expanded(model: Model, channels: Collection[str] = ()) -> Model:
-    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, settled at first.
+    """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, settled at first, and
+    one of inputs alone about so, with a spread that a fit finds.
 
     One mechanism then serves its dynamics, its sensitivities to e and to tau, its report and its export.
     Equal lags share one state.
@@ -282,8 +283,9 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     states, extra = dict(model.states), []
     for apply, name in found.items():
         inner, tau = apply.arguments
-        # its balance is what it is fed with: a memory starts settled
-        states[name] = State(name, "", start_sd=0.0, memory=True)
+        # its balance is what it is fed with: a memory starts settled; how an input was before, nobody knows
+        sd = None if names(inner).isdisjoint(model.states) else 0.0
+        states[name] = State(name, "", start_sd=sd, memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
     return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)
 
