@@ -248,3 +248,33 @@ def test_a_temperature_that_nobody_reads_stays_near_what_its_author_believes() -
     assert cellar.low is not None
     assert cellar.high is not None
     assert 20.0 < cellar.high - cellar.low < 45.0  # as wide as what was believed
+
+
+def test_a_recording_may_begin_with_a_switch_on() -> None:
+    """A heater with a mass of its own was cold before its first sample, and is no other heater for that."""
+    tau, every = 300.0, 30.0
+    rng = np.random.default_rng(5)
+    time = every * np.arange(400.0)
+    runs = []
+    for name in ("a", "b"):
+        load = np.repeat(rng.permutation([25.0, 10.0, 20.0, 5.0]), 100)
+        heater, body = 0.0, 23.0
+        read = np.empty(len(time))
+        for k, heat in enumerate(load):
+            read[k] = body + NOISE * rng.standard_normal()
+            for _ in range(30):  # steps of a second
+                heater, body = (
+                    heater + (heat - heater) / tau,
+                    body + TRUTH["h"] * (23.0 - body) + TRUTH["g"] * heater,
+                )
+        values = {"load": load, "room": np.full(len(time), 23.0), "T": read}
+        runs.append(Recording(name, time, values))
+    terms = tuple(Term(e, "T", parse(e)) for e in ("h*(room - T)", "g*lag(load, tau)"))
+    heated = replace(
+        model(), terms=terms, parameters={**model().parameters, "tau": Parameter(100.0, "s", 1.0)}
+    )
+    found = fit_model(heated, campaign(*runs, spread=0.0), ["a", "b"]).model.parameters["tau"]
+    assert found.low is not None
+    assert found.high is not None
+    assert found.low < tau < found.high
+    assert found.value == pytest.approx(tau, rel=0.1)
