@@ -30,6 +30,7 @@ from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.diagnosis.withdrawal import idle, refuted, small, unfinished, unforeseen, wrong_readings
 from discovery.diagnosis.written import written
+from discovery.dynamics import gaps
 from discovery.effects.catalogue import catalogue
 from discovery.effects.form import Effect
 from discovery.effects.hypothesis import Hypothesis
@@ -349,6 +350,8 @@ def _reasons(
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     answer = verdict.answer
+    grids = [run.system.grid for run in answer.fit.trajectories]
+    said += gaps.sentences({grid.recording: grid.silent for grid in grids})
     if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause
         return [*said, *late.sentences(answer.fit, is_right=False)]
     return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]

@@ -13,6 +13,8 @@ G D.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -55,3 +57,22 @@ def _apart(samples: Samples, gap: float) -> float:
     time = np.linspace(begin, end - 2 * half, _ENOUGH)
     first, middle, last = (samples.at(time + by) for by in (0.0, half, 2 * half))
     return float(np.mean((middle - (0.5 * (first + last) if samples.linear else first)) ** 2))
+
+
+def sentences(silent: Mapping[str, Mapping[str, Samples]]) -> list[str]:
+    """A sentence for each recording with gaps. `silent`: by recording and channel, as `unknown_in_gaps`."""
+    said = []
+    for recording, channels in silent.items():
+        gaps = {
+            (float(one.time[k]), float(one.time[k + 1]))
+            for one in channels.values()
+            for k in np.flatnonzero(one.value)
+        }
+        if not gaps:
+            continue
+        begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
+        more = f", nor in {len(gaps) - 1} more gap{'s' * (len(gaps) > 2)}" if len(gaps) > 1 else ""
+        when = f"from {begin / 3600:.3g} to {end / 3600:.3g} h"
+        did = f"what {', '.join(channels)} did in {recording} {when}"
+        said.append(f"{did} is not recorded{more}; the fit allows for it")
+    return said

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis import diagnose
 from discovery.dynamics import make_grid, make_system, simulate
-from discovery.dynamics.gaps import unknown_in_gaps
+from discovery.dynamics.gaps import sentences, unknown_in_gaps
 from discovery.dynamics.samples import Samples
 from discovery.fitting.impulses import inputs_in_gaps
 from discovery.models import Model, Parameter, State
@@ -82,3 +82,11 @@ def test_what_inputs_did_meanwhile_is_no_event() -> None:
     assert last[0] != last[1] or last[2] != last[3]  # it switched
     answer = document(diagnose(model(), campaign(*runs), ["r1", "r2"]))
     assert (answer["verdict"], answer["physics"]) == ("no mismatch", [])
+
+
+def test_the_longest_gap_is_said() -> None:
+    unknown = unknown_in_gaps(with_gap(linear=False))
+    assert unknown is not None
+    assert sentences({"a": {"P": unknown, "speed": unknown}, "b": {}}) == [
+        "what P, speed did in a from 12 to 13 h is not recorded; the fit allows for it"
+    ]
