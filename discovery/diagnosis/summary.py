@@ -66,7 +66,8 @@ def _otherwise(one: dict[str, Any], unit: str) -> str:
         return ""
     if (after - before) * (one["rms_after"] - one["rms_before"]) >= 0:
         return ""
-    return f"; with start values from all readings, rms {printed(before)} -> {printed(after)}{unit}"
+    rms = f"rms {printed(before)} -> {printed(after)}{unit}"
+    return f"; with start values from all readings, {rms}, and this one decides: how it began is not read"
 
 
 def _left(improvement: dict[str, Any], noise: str) -> list[str]:

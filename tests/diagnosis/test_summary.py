@@ -138,7 +138,14 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
 
 @pytest.mark.parametrize(
     ("starts", "said"),
-    [([1.11, 0.466], "; with start values from all readings, rms 1.11 -> 0.466 K"), ([1.11, 1.3], "")],
+    [
+        (
+            [1.11, 0.466],
+            "; with start values from all readings, rms 1.11 -> 0.466 K, and this one decides: how it began is "
+            "not read",
+        ),
+        ([1.11, 1.3], ""),
+    ],
 )
 def test_starts_that_turn_the_proof_around_are_said(tmp_path: Path, starts: list[float], said: str) -> None:
     """A hidden body starts unknown: from first readings alone the right repair may look worse."""
