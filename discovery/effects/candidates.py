@@ -202,7 +202,8 @@ def _naming(
     binding: Mapping[str, Expression],
     scene: Scene,
 ) -> _Naming:
-    everywhere = spot.each or (spot.terms and len({t.into for t in spot.terms}) > 1)
+    of_pair = effect.place in ("link", "any pair")
+    everywhere = spot.each or (spot.terms and len({t.into for t in spot.terms}) > 1 and not of_pair)
     at = () if everywhere else spot.bodies or spot.outputs[: 1 if len(spot.outputs) == 1 else 0]
     suffix = "_".join([*channels, *at, *begins])
     taken = {*model.parameters, *model.states, *scene.channels}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -70,7 +70,7 @@ def layout(model: Model, channels: Mapping[str, Channel]) -> Layout:
         fed("heat load"),
         tuple(b for b in bodies if any(t.into == b and _is_friction(t, model, role) for t in own)),
         fed("ambient temperature"),
-        frozenset(frozenset((t.into, t.source)) for t in own if t.source),
+        frozenset(frozenset((t.into, other)) for t in own for other in _others(t, bodies)),
         own,
     )
 
@@ -224,7 +224,16 @@ def _heats(model: Model, parts: Layout, role: Mapping[str, str]) -> tuple[Term, 
 
 def _between(parts: Layout, a: str, b: str) -> tuple[Term, ...]:
     """Terms of the link of two bodies."""
-    return tuple(t for t in parts.own if t.source and {t.into, t.source} == {a, b})
+    return tuple(t for t in parts.own if {a, b} in [{t.into, other} for other in _others(t, parts.bodies)])
+
+
+def _others(term: Term, bodies: Sequence[str]) -> list[str]:
+    """The body that a flow leaves; where rates have no capacities, each of two bodies has a term that follows
+    the other one.
+    """
+    if term.source:
+        return [term.source]
+    return [b for b in bodies if b != term.into and b in names(term.expression)]
 
 
 def _of(terms: tuple[Term, ...]) -> Iterator[Spot]:

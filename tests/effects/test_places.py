@@ -445,3 +445,25 @@ def test_friction_answers_to_the_oil_next_to_its_body() -> None:
 def test_a_share_of_all_is_no_end_of_its_range(word: str) -> None:
     """A fit that ends at a bound has no size: a pump that ran dry was lost, and heat took its place."""
     assert catalogue()[word].amplitude.ends[1] > 1.0
+
+
+def test_a_joint_without_capacities_is_a_term_at_each_of_its_bodies() -> None:
+    """Rates in K/h: what leaves one body is not what enters the other, so each has a number of its own."""
+    model, channels = sample()
+    rates = {name: replace(s, capacity=None) for name, s in model.states.items()}
+    own = tuple(t for t in model.terms if {t.into, t.source} != {"motor", "table"})
+    joint = (
+        Term("joint", "table", parse("k_t*(motor - table)")),
+        Term("joint back", "motor", parse("-k_m*(motor - table)")),
+    )
+    both = replace(model, states=rates, terms=(*own, *joint))
+    (one,) = [
+        h
+        for h in claims(both, catalogue()["joint_loosening"], channels)
+        if set(h.states) == {"motor", "table"}
+    ]
+    assert {t.into for t in one.terms} == {"motor", "table"}
+    assert len(one.amplitudes) == 1
+    assert "motor" in one.amplitudes[0]
+    paths = claims(both, catalogue()["conduction_path"], channels)
+    assert not any(set(h.states) == {"motor", "table"} for h in paths)
