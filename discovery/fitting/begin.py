@@ -20,7 +20,7 @@ from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
-_BEGINS = 0.05  # of what a state moves in a recording, how far from its start it may begin
+_BEGINS = {"fitted": 0.05, "moved": 0.5}  # of what a state moves, how far from its start it may begin
 _APART, _SEVERAL = 0.7, 5  # of logarithms of sizes: how far other beginnings are, and how many are drawn
 _LOOK, _ROUGHLY = 15, 1e-3  # steps from each of them, and the relative change of the cost that ends them
 _CLEARLY = 10.0  # by which the cost of another minimum has to be smaller
@@ -125,12 +125,12 @@ def _rough(readings: Sequence[Array]) -> float:
 
 def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[str, float]:
     """A first guess of how far states begin from their start that are neither read nor given a spread: a
-    share of what they move.
+    share of what they move. Before a recording the inputs of a memory may have been as they are later in it.
     """
-    asked = [u for u in problem.unknowns if u.spread == "fitted" and u.is_start]
+    asked = [u for u in problem.unknowns if u.spread in _BEGINS and u.is_start]
     moved: dict[str, float] = {}
     for run in runs:
         for u in (u for u in asked if u.recording == run.system.grid.recording):
             series = run.x[:, run.system.states.index(u.name)]
-            moved[u.name] = max(moved.get(u.name, 0.0), _BEGINS * float(np.ptp(series)), 1e-6)
+            moved[u.name] = max(moved.get(u.name, 0.0), _BEGINS[u.spread] * float(np.ptp(series)), 1e-6)
     return moved

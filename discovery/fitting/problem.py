@@ -35,6 +35,10 @@ FARTHEST = 1e6  # times its start that a parameter may go: no recording shows mo
 UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
 
 
+# given, by the noise of what is read, by how far it moves later, or found by the fit
+Spread = Literal["given", "read", "moved", "fitted"]
+
+
 class Prior(NamedTuple):
     """Prior of a parameter: mean and standard deviation, of its logarithm with `is_log`."""
 
@@ -62,7 +66,7 @@ class Unknown:
     prior: tuple[float, float] | None = None  # mean and standard deviation
     is_log: bool = False  # ... of its logarithm
     belief: float | None = None  # the start value is believed within a factor exp(belief), with heavy tails
-    spread: Literal["given", "read", "fitted"] = "given"  # how the prior of a start is known
+    spread: Spread = "given"  # how the prior of a start is known
     is_offset: bool = False  # `name` is the channel
     is_late: bool = False  # likewise
 
@@ -122,13 +126,14 @@ class Problem:
             if u.spread == "read":
                 system = next(s for s in self.systems if s.grid.recording == u.recording)
                 unknowns[i] = replace(u, prior=(0.0, read_spread(system, u.name, white)))
-            elif u.spread == "fitted" and found and u.name in found:
+            elif u.spread in ("moved", "fitted") and found and u.name in found:
                 unknowns[i] = replace(u, prior=(0.0, found[u.name]))
         return replace(self, unknowns=tuple(unknowns))
 
     def start_spreads(self) -> dict[str, float]:
-        """By state: the spread of its starts, where the fit has found it."""
-        return {u.name: u.prior[1] for u in self.unknowns if u.is_start and u.spread == "fitted" and u.prior}
+        """By state: the spread of its starts, where it is neither given nor read."""
+        own = (u for u in self.unknowns if u.is_start and u.spread in ("moved", "fitted"))
+        return {u.name: u.prior[1] for u in own if u.prior}
 
     def prior_rows(self, theta: Array, together: float = 1.0) -> tuple[Array, Array]:
         """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U).
@@ -292,15 +297,17 @@ def _parameter(
     return Unknown(name, recording, False, start, low, high, known, is_log, belief)
 
 
-def _zero_spread(is_output: bool) -> list[Literal["given", "fitted"]]:
+def _zero_spread(is_output: bool) -> list[Spread]:
     """How the spread of an offset is known: that of an output's zeros is at most the stated one."""
     return ["fitted"] if is_output else ["given"]
 
 
-def _start_spread(state: State) -> tuple[float, Literal["given", "read", "fitted"]]:
+def _start_spread(state: State) -> tuple[float, Spread]:
     """Standard deviation of a start before anything is known of noise and size, and how it is known."""
     if state.start_sd is not None:
         return state.start_sd, "given"
+    if state.memory:
+        return 1.0, "moved"
     return 1.0, "read" if state.read_as else "fitted"
 
 
