@@ -59,7 +59,7 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
         if label != (h.effect.word, h.where):
             if label not in below or gap < below[label].below:
                 below[label] = Rival(rival, gap)
-        elif gap <= thresholds.RIVAL and rival.law == h.law and None in (h.recording, rival.recording):
+        elif gap <= thresholds.RIVAL and rival.law == h.law and None in (h.event, rival.event):
             same.append(rival)
     rivals = tuple(sorted(below.values(), key=lambda r: r.below))
     near = [r.hypothesis for r in rivals if r.below <= thresholds.RIVAL]
@@ -70,10 +70,10 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
 
 
 def claims(one: Scored, h: Hypothesis) -> bool:
-    """Whether a model holds an effect, or one that is stated in the same words: by another input that no
-    report names, it is no other answer.
+    """Whether a model holds an effect, or one that is the same claim: by another input that no report names,
+    it is no other answer.
     """
-    return any(o.stated == h.stated for o in one.hypotheses)
+    return any(o.claim == h.claim for o in one.hypotheses)
 
 
 def added(found: Search, answer: Scored, h: Hypothesis) -> float:

@@ -72,8 +72,8 @@ class Posterior:
         """Probability that one of several effects acts at any place, from the inputs that it follows, in the
         recordings of its hypothesis.
         """
-        claims = {(h.effect.word, h.follows, h.recording) for h in several}
-        return self.of(lambda m: any((o.effect.word, o.follows, o.recording) in claims for o in m.hypotheses))
+        claims = {(h.effect.word, h.follows, h.event) for h in several}
+        return self.of(lambda m: any((o.effect.word, o.follows, o.event) in claims for o in m.hypotheses))
 
     @property
     def nothing(self) -> float:

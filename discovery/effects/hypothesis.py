@@ -66,6 +66,18 @@ class Hypothesis:
         return f"{self.effect.word} at {self.where}{event}"
 
     @property
+    def event(self) -> str | None:
+        """The recording that it is a claim of; None for what ages: whether at once or from recording to
+        recording, and from which one on, is no other claim.
+        """
+        return None if self.effect.acts == "as parts age" else self.recording
+
+    @property
+    def claim(self) -> tuple[str, str, str | None]:
+        """What is claimed: the effect, where it acts, and the recording of an event."""
+        return self.effect.word, self.where, self.event
+
+    @property
     def follows(self) -> tuple[str, ...]:
         """Inputs that it follows, of an effect that may follow any of some roles; one that is its place is
         none of them.

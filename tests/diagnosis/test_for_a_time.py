@@ -106,6 +106,16 @@ def test_growth_is_no_step_and_two_recordings_show_none() -> None:
     assert not any(h.grows for h in claims(model(), "wear", recordings=["r1", "r2"]))
 
 
+def test_when_a_part_aged_is_no_other_claim() -> None:
+    """A cooler that fouls in each recording was no cooler that fouls, next to a step in the second one."""
+    aged = [h for h in claims(model(), "wear", recordings=["r1", "r2", "r3"]) if h.states == ("motor",)]
+    assert [(h.recording, h.grows) for h in aged] == [("r2", False), ("r3", False), ("r2", True)]
+    assert len({h.key for h in aged}) == 3
+    assert {h.claim for h in aged} == {("wear", "motor", None)}
+    jumps = claims(model(), "sensor_offset", recordings=["r1", "r2"])
+    assert len({h.claim for h in jumps}) == len(jumps)
+
+
 def test_a_wrong_scale_is_named_in_its_recording() -> None:
     answer = found(scale=1.15)
     (one,) = answer["physics"]
