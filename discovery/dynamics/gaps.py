@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 MISSED = 3.0  # usual steps: a longer one is a gap
 REGULAR = 0.9  # of the steps are usual ones, or the channel is written when it changes
-_ENOUGH = 4000  # instants at which a structure function is taken
+_ENOUGH = 4000  # instants at which a structure function is taken ...
+_LENGTHS = 8  # ... and lengths of gaps, where there are several
 
 
 def unknown_in_gaps(samples: Samples) -> Samples | None:
@@ -44,10 +45,13 @@ def unknown_in_gaps(samples: Samples) -> Samples | None:
     gaps = np.flatnonzero(step > MISSED * usual)
     if not gaps.size or np.mean(step <= MISSED * usual) < REGULAR:
         return None
-    size = np.zeros(len(samples.time))
-    for k in gaps:
-        size[k] = np.sqrt(step[k] * _apart(samples, float(step[k])))
-    return Samples(samples.time, size, False)
+    length, begin, end = step[gaps], samples.time[gaps], samples.time[gaps + 1]
+    some = np.geomspace(length.min(), length.max(), _LENGTHS) if np.ptp(length) > 0 else length[:1]
+    apart = np.interp(length, some, [_apart(samples, float(one)) for one in some])
+    time = np.unique(np.concatenate([samples.time[:1], end, begin]))
+    size = np.zeros(len(time))
+    size[np.searchsorted(time, begin)] = np.sqrt(length * apart)
+    return Samples(time, size, False)
 
 
 def _apart(samples: Samples, gap: float) -> float:

@@ -61,7 +61,7 @@ def inputs_in_gaps(trajectory: Trajectory) -> Array:
     impulse = _impulses(trajectory, *_noise(trajectory, unknown))
     fresh = np.einsum("cki,ckj->kij", impulse, impulse)
     read = trajectory.system.grid.read
-    found = np.zeros((len(read) - 1, *fresh.shape[1:]))
+    found = np.zeros((max(len(read) - 1, 0), *fresh.shape[1:]))
     for r in np.flatnonzero([fresh[a:b].any() for a, b in pairwise(read)]):
         for k in range(read[r], read[r + 1]):
             way = trajectory.e[trajectory.which[k]]

@@ -34,7 +34,6 @@ MOST = 2.0  # of what is expected, the most that an input is logged late
 FARTHEST = 1e6  # times its start that a parameter may go: no recording shows more, and the arithmetic fails
 UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
 
-
 # given, by the noise of what is read, by how far it moves later, or found by the fit
 Spread = Literal["given", "read", "moved", "fitted"]
 
