@@ -3,8 +3,8 @@
     q = -lost q_air    [W] at each body, from a recording on; or -k lost q_air in the k-th one after the first
 
 q_air: what the model exchanges with the air there; lost: share that is gone, 0.1 to 0.5, negative after
-cleaning. Source: Bott, Fouling of Heat Exchangers (Elsevier 1995), chapter 1: deposits on the air side, and
-the lower air flow behind them. Limits: never inside a recording; what all recordings share is the model's own
+cleaning. Source: Bott, Fouling of Heat Exchangers (Elsevier 1995): deposits on the air side, and the
+lower air flow behind them. Limits: never inside a recording; what all recordings share is the model's own
 parameter.
 """
 
