@@ -350,8 +350,7 @@ def _reasons(
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     answer = verdict.answer
-    grids = [run.system.grid for run in answer.fit.trajectories]
-    said += gaps.sentences({grid.recording: grid.silent for grid in grids})
+    said += gaps.sentences({run: grid.silent for run, grid in context.grids.items()})
     if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause
         return [*said, *late.sentences(answer.fit, is_right=False)]
     return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]

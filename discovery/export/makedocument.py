@@ -144,7 +144,7 @@ def _state(state: State) -> dict[str, Any]:
         "unit": state.unit,
         "scale": state.scale,
         "start": text(state.start) if state.start is not None else None,
-        "start_sd": state.start_sd,
+        "start_sd": state.start_sd or 0.0,  # a memory starts with what it is fed with
     }
     body = {"capacity": state.capacity} if state.capacity else {}
     follows = {"start_with": dict(state.start_with)} if state.start_with else {}

@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.dynamics import Trajectory
+from discovery.dynamics import Trajectory, at_rest
 from discovery.errors import RunsAwayError
 from discovery.fitting.noise import Noise, roughness, white_noise
 from discovery.fitting.problem import Problem
@@ -125,12 +125,33 @@ def _rough(readings: Sequence[Array]) -> float:
 
 def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[str, float]:
     """A first guess of how far states begin from their start that are neither read nor given a spread: a
-    share of what they move. Before a recording the inputs of a memory may have been as they are later in it.
+    share of what they move. Of a machine that is not in balance with its first inputs, they may have been
+    before as they are later in the recording: so far off may a memory of them begin.
     """
     asked = [u for u in problem.unknowns if u.spread in _BEGINS and u.is_start]
     moved: dict[str, float] = {}
     for run in runs:
-        for u in (u for u in asked if u.recording == run.system.grid.recording):
+        mine = [u for u in asked if u.recording == run.system.grid.recording]
+        shares = {"fitted": _BEGINS["fitted"], "moved": 0.0}
+        if any(u.spread == "moved" for u in mine):
+            shares["moved"] = _BEGINS["moved"] * _unrest(run)
+        for u in mine:
             series = run.x[:, run.system.states.index(u.name)]
-            moved[u.name] = max(moved.get(u.name, 0.0), _BEGINS[u.spread] * float(np.ptp(series)), 1e-6)
+            moved[u.name] = max(moved.get(u.name, 0.0), shares[u.spread] * float(np.ptp(series)), 1e-6)
     return moved
+
+
+def _unrest(run: Trajectory) -> float:
+    """How far from their balance with the first inputs states that are read begin, as a share of what they
+    move, at most one: a machine that begins in balance has been at rest, and remembers nothing else. Inputs
+    count as they were recorded, and a difference within the spread of one says nothing.
+    """
+    grid = run.system.grid.shifted({})
+    unsure = max((grid.spread.get(name, 0.0) for name in grid.samples), default=0.0)
+    read = [i for i, name in enumerate(run.system.states) if run.system.model.states[name].read_as]
+    try:
+        away = run.x[0] - at_rest(replace(run.system, grid=grid), run.values)
+    except RunsAwayError:
+        return 1.0
+    share = (np.abs(away[read]) - unsure) / np.maximum(np.ptp(run.x, axis=0)[read], 1e-9)
+    return float(np.clip(share.max(initial=0.0), 0.0, 1.0))

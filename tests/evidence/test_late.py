@@ -113,7 +113,7 @@ def test_what_may_stand_for_an_unknown_cause_is_said_otherwise(
     )
     monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
     monkeypatch.setattr(module, "not_offered", lambda *_: [])
-    context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=())
+    context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=(), grids={})
     answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)))
     assert module._reasons(context, SimpleNamespace(word=word, answer=answer), [], {}, [], []) == said
 

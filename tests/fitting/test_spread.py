@@ -270,9 +270,9 @@ def test_a_recording_may_begin_with_a_switch_on() -> None:
         values = {"load": load, "room": np.full(len(time), 23.0), "T": read}
         runs.append(Recording(name, time, values))
     terms = tuple(Term(e, "T", parse(e)) for e in ("h*(room - T)", "g*lag(load, tau)"))
-    heated = replace(
-        model(), terms=terms, parameters={**model().parameters, "tau": Parameter(100.0, "s", 1.0)}
-    )
+    parameters = {**model().parameters, "tau": Parameter(100.0, "s", 1.0)}
+    states = {"T": State("T", "degC", None, parse("room"), None, 1.0)}
+    heated = replace(model(), terms=terms, parameters=parameters, states=states)
     found = fit_model(heated, campaign(*runs, spread=0.0), ["a", "b"]).model.parameters["tau"]
     assert found.low is not None
     assert found.high is not None
