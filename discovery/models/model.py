@@ -256,7 +256,7 @@ def _short(apply: Apply) -> Expression | None:
 
 def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     """The model with every lag(e, tau) written out as a hidden state: tau ds/dt = e - s, settled at first;
-    one of inputs alone only about so, within a spread that a fit finds.
+    one of inputs alone only if the machine begins in balance with them (`fitting/begin.py`).
 
     One mechanism then serves its dynamics, its sensitivities to e and to tau, its report and its export.
     Equal lags share one state.
