@@ -40,8 +40,8 @@ def small(found: Search, verdict: Verdict, free_heat: float) -> Verdict:
     Args:
         free_heat: log evidence of heat of any course at the body where it explains most.
     """
-    least = max(free_heat, _beyond_laws(found))
-    if verdict.word != UNEXPLAINED or verdict.named or coarse(found) or least > 0:
+    shows = max(free_heat, _beyond_laws(found))
+    if verdict.word != UNEXPLAINED or verdict.named or coarse(found) or shows > 0:
         return verdict
     reasons = (SMALL, *unrecorded(found), *verdict.reasons)
     return replace(verdict, word=NO_MISMATCH, candidates=(), reasons=reasons)

@@ -283,7 +283,7 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     states, extra = dict(model.states), []
     for apply, name in found.items():
         inner, tau = apply.arguments
-        # its balance is what it is fed with: a memory starts settled; how an input was before, nobody knows
+        # a memory starts settled with what it is fed with; what inputs were before is not known
         sd = None if names(inner).isdisjoint(model.states) else 0.0
         states[name] = State(name, "", start_sd=sd, memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
