@@ -222,13 +222,13 @@ class Whitened:
         """Columns (R, Y, M) by recording whitened and stacked (N, M), and the logarithms (N,) of the standard
         deviations of the innovations.
         """
-        unit = _unit(noise)
-        parts = [p.whitened(unit, c) for p, c in zip(self.filters, columns, strict=True)]
+        bare = _bare(noise)
+        parts = [p.whitened(bare, c) for p, c in zip(self.filters, columns, strict=True)]
         return np.concatenate([z for z, _ in parts]), np.concatenate([log for _, log in parts])
 
     def whiten_one(self, noise: Noise, recording: int, columns: Array) -> Array:
         """Columns (R, Y, M) of one recording whitened, (readings of it, M)."""
-        return self.filters[recording].whitened(_unit(noise), columns)[0]
+        return self.filters[recording].whitened(_bare(noise), columns)[0]
 
     def rows(self, noise: Noise) -> tuple[Array, Array]:
         """Whitened residual and sensitivities (N, 1 + U), logarithms (N,) as in `whiten`."""
@@ -240,28 +240,34 @@ class Whitened:
         if "rows" not in self.last or self.last["rows"][0] != unit:
             parts = [self._part(k, unit) for k in range(len(self.filters))]
             rows = np.zeros((len(self.block), self.jacobians[0].shape[2] + 1))
-            for here, columns, (part, _) in zip(self.places, self.acting, parts, strict=True):
+            for here, (columns, _), (part, _) in zip(self.places, self._joined(unit), parts, strict=True):
                 rows[here, columns] = part
             self.last["rows"] = (unit, (rows, np.concatenate([log for _, log in parts])))
         known: tuple[Array, Array] = self.last["rows"][1]
         return known
 
-    @cached_property
-    def joined(self) -> list[Array]:
-        """Residuals and sensitivities by recording, (R, Y, C) of the C columns that act there."""
-        return [
-            np.ascontiguousarray(np.concatenate([r[:, :, None], j[:, :, columns[1:] - 1]], axis=2))
-            for r, j, columns in zip(self.residuals, self.jacobians, self.acting, strict=True)
-        ]
-
-    @cached_property
-    def acting(self) -> list[Ints]:
-        """Columns (C,) of 1 + U + E that are not zero in a recording: starts and offsets belong to one."""
-        return [np.concatenate([[0], 1 + np.flatnonzero(j.any(axis=(0, 1)))]) for j in self.jacobians]
+    def _joined(self, unit: Noise) -> list[tuple[Ints, Array]]:
+        """By recording, which of the columns of 1 + U + E act there (C,), and residual and sensitivities
+        (R, Y, C) of these: starts and offsets belong to one recording, and form errors of a share of zero act
+        nowhere.
+        """
+        key = f"joined {unit.form:g} {unit.edge:g}"
+        if key not in self.last:
+            on = self._scale(unit)[1:] > 0
+            acting = [np.flatnonzero(j.any(axis=(0, 1)) & on) for j in self.jacobians]
+            self.last[key] = [
+                (
+                    np.concatenate([[0], 1 + mine]),
+                    np.ascontiguousarray(np.concatenate([r[:, :, None], j[:, :, mine]], axis=2)),
+                )
+                for r, j, mine in zip(self.residuals, self.jacobians, acting, strict=True)
+            ]
+        known: list[tuple[Ints, Array]] = self.last[key]
+        return known
 
     def _part(self, k: int, unit: Noise) -> tuple[Array, Array]:
         """Rows (N, C) and logarithms (N,) of one recording."""
-        return self.filters[k].whitened(unit, self.joined[k])
+        return self.filters[k].whitened(_bare(unit), self._joined(unit)[k][1])
 
     def _scale(self, noise: Noise) -> Array:
         """What multiplies the columns (1 + U,) under the form error of a noise."""
@@ -314,7 +320,8 @@ class Whitened:
             log[a:b].sum() for (_, log), e in zip(parts, edges, strict=True) for a, b in pairwise(e.tolist())
         ]
         size = self.jacobians[0].shape[2] + 1
-        return Rows(size, tuple(rows for rows, _ in parts), tuple(self.acting), tuple(edges), np.array(dets))
+        columns = tuple(mine for mine, _ in self._joined(unit))
+        return Rows(size, tuple(rows for rows, _ in parts), columns, tuple(edges), np.array(dets))
 
 
 def moving(fit: Fit) -> Ints:
@@ -355,8 +362,13 @@ def absorbed(rows: Array, prior: Array) -> Absorbed:
 
 
 def _unit(noise: Noise) -> Noise:
-    """A noise with form errors of one: they are columns, and no filter depends on them."""
-    return replace(noise, form=1.0, edge=1.0)
+    """A noise with those form errors of one that it has: they are columns, of any share the same."""
+    return replace(noise, form=float(noise.form > 0), edge=float(noise.edge > 0))
+
+
+def _bare(noise: Noise) -> Noise:
+    """A noise without form errors: no filter depends on them."""
+    return replace(noise, form=0.0, edge=0.0)
 
 
 def _scale(diagonal: Array) -> Array:

@@ -17,6 +17,8 @@ from discovery.evidence.form_error import (
     inside_columns,
     place_columns,
 )
+from discovery.evidence.whitening import Whitened
+from discovery.fitting import Noise, fit_model
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -45,6 +47,33 @@ def warmed(**shown: str) -> Trajectory:
     model = Model("one", {"hA": Parameter(HA)}, {"T": state}, terms, outputs)
     campaign = Campaign("c", channels, {"r": Recording("r", TIME, values)})
     return simulate(make_system(model, make_grid(campaign, "r", ["u"], tuple(shown))), model.values())
+
+
+@pytest.mark.parametrize(("form", "edge"), [(0.0, 0.3), (0.2, 0.0), (0.2, 0.3)])
+def test_a_level_is_the_restricted_likelihood_with_form_errors_of_a_share(form: float, edge: float) -> None:
+    """Dense covariance: w^2 I + form^2 L L' + edge^2 P P', with the gain of the model integrated out (Patterson
+    and Thompson, Biometrika 58 (1971) 545), less that without form errors.
+    """
+    rng = np.random.default_rng(3)
+    x, laws, places = np.sin(TIME[::40] / 9000), rng.normal(size=(25, 2)), rng.normal(size=(25, 1))
+    read = 2.0 * x + rng.normal(0, 0.5, 25) + laws @ [0.4, -0.3]
+    kinds = {"u": ("heat load", "W", None), "y": ("error", "um", 0.5)}
+    channels = {name: Channel(name, *kind, "linear") for name, kind in kinds.items()}
+    campaign = Campaign("c", channels, {"r": Recording("r", TIME[::40], {"u": x, "y": read})})
+    model = Model("gain", {"g": Parameter(1.0)}, {}, (), {"y": parse("g*u")})
+    fit = fit_model(model, campaign, ["r"], ["y"])
+    both = np.concatenate([laws, places], axis=1)
+    seen = Whitened(fit, 1, (both[:, None, :],), np.ones(3), (2, 1))
+    levels = [seen.grams(Noise(("y",), (0.5,), form=f, edge=e)).level() for f, e in ((form, edge), (0.0, 0.0))]
+
+    def restricted(f: float, e: float) -> float:
+        covariance = 0.25 * np.eye(25) + f**2 * laws @ laws.T + e**2 * places @ places.T
+        inverse = np.linalg.inv(covariance)
+        information = float(x @ inverse @ x)
+        left = read @ inverse @ read - (x @ inverse @ read) ** 2 / information
+        return -0.5 * (np.linalg.slogdet(covariance)[1] + np.log(information) + left)
+
+    assert levels[0] - levels[1] == pytest.approx(restricted(form, edge) - restricted(0.0, 0.0), abs=1e-6)
 
 
 def test_warmer_air_at_one_body_warms_it_alone() -> None:
