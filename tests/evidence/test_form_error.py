@@ -71,7 +71,7 @@ def test_a_level_is_the_restricted_likelihood_with_form_errors_of_a_share(form: 
         inverse = np.linalg.inv(covariance)
         information = float(x @ inverse @ x)
         left = read @ inverse @ read - (x @ inverse @ read) ** 2 / information
-        return -0.5 * (np.linalg.slogdet(covariance)[1] + np.log(information) + left)
+        return -0.5 * float(np.linalg.slogdet(covariance)[1] + np.log(information) + left)
 
     more = seen.grams(off).level() - seen.grams(exact).level()
     assert more == pytest.approx(restricted(form, edge) - restricted(0.0, 0.0), abs=1e-6)
