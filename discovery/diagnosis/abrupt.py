@@ -19,9 +19,10 @@ def is_abrupt(answer: Scored, h: Hypothesis) -> bool:
     that are wrong by as much as any model's, the readings at which it comes make it more likely than not.
 
     What the worst other reading misses counts against it: such readings come by themselves. A sensor that
-    hangs jumps when it shows its body again.
+    hangs jumps when it shows its body again. Where two sensors jump in the same block of time, one cause
+    moves both, and it is no fault of either.
     """
-    if h.effect.search != "step" or h.effect.is_physics or h.recording is None:
+    if not _is_jump(h) or h.recording is None or any(comes_with(answer, h, o) for o in answer.hypotheses):
         return False
     parameters = answer.model.parameters
     shapes = {name: parameters[name].value for name in h.shapes}
@@ -40,3 +41,17 @@ def is_abrupt(answer: Scored, h: Hypothesis) -> bool:
         return False
     there = float(np.sum(gain[first, moved]) - 0.5 * left[:, moved].max(initial=0.0))
     return there + h.log_odds + h.log_weight > 0.0
+
+
+def _is_jump(h: Hypothesis) -> bool:
+    return h.effect.search == "step" and not h.effect.is_physics
+
+
+def comes_with(answer: Scored, h: Hypothesis, other: Hypothesis) -> bool:
+    """Whether another sensor jumps in the block of time in which one does."""
+    if other.key == h.key or not _is_jump(other) or other.recording != h.recording:
+        return False
+    times = [min(answer.model.parameters[name].value for name in one.shapes) for one in (h, other)]
+    grid = next(t.system.grid for t in answer.fit.trajectories if t.system.grid.recording == h.recording)
+    block = float(grid.time[-1] - grid.time[0]) / answer.seen.blocks
+    return set(h.shown).isdisjoint(other.shown) and abs(times[0] - times[1]) < block

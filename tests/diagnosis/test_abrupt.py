@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
+import pytest
 
 from discovery.diagnosis import Diagnosis, diagnose
+from discovery.diagnosis.abrupt import comes_with
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -51,6 +56,35 @@ def test_a_jump_is_named_where_the_flows_of_the_model_are_wrong() -> None:
     assert answer.after is not None
     assert abs(answer.after.model.parameters["offset_T_r2"].value - 12.0) < 1.0
     assert abs(answer.after.model.parameters["t_step_T_r2"].value - 300.0) <= 4.0
+
+
+@pytest.mark.parametrize(("later", "named"), [(8.0, False), (200.0, True)])
+def test_two_sensors_that_jump_at_once_are_no_faults(later: float, named: bool) -> None:
+    """A gas heater that was switched off: the water at its outlet and the wall of its exchanger jumped within
+    2 s, and both thermometers were named as faults with 98 %.
+    """
+    times = {"t_T": 300.0, "t_plate": 300.0 + later}
+    jumps = [
+        SimpleNamespace(key=name, effect=SimpleNamespace(search="step", is_physics=False), recording="r1")
+        for name in ("T", "plate")
+    ]
+    for h in jumps:
+        h.shapes, h.shown = {f"t_{h.key}": times[f"t_{h.key}"]}, {h.key: None}
+    grid = SimpleNamespace(recording="r1", time=np.array([0.0, 600.0]))
+    run = SimpleNamespace(system=SimpleNamespace(grid=grid))
+    parameters = {name: SimpleNamespace(value=value) for name, value in times.items()}
+    answer = SimpleNamespace(
+        model=SimpleNamespace(parameters=parameters),
+        fit=SimpleNamespace(trajectories=(run,)),
+        seen=SimpleNamespace(blocks=12),
+        hypotheses=tuple(jumps),
+    )
+    assert [comes_with(cast(Any, answer), cast(Any, h), cast(Any, o)) for h in jumps for o in jumps] == [
+        False,
+        not named,
+        not named,
+        False,
+    ]
 
 
 def test_wrong_flows_alone_are_no_jump() -> None:
