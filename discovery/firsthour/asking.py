@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from discovery.errors import UsageError
 from discovery.firsthour.guess import SURE, Guess
-from discovery.firsthour.measures import TIME_UNITS, known_unit, time_unit
+from discovery.firsthour.measures import TIME_UNITS, time_unit, unit_of
 from discovery.firsthour.table import Column
 from discovery.recordings.roles import ROLES
 from discovery.recordings.units import UnitError, conversion
@@ -98,9 +98,13 @@ def read_statements(given: Sequence[str]) -> tuple[dict[str, tuple[str | None, s
         unit = parts[1] if len(parts) > 1 else None if role else parts[0]
         if role is None and len(parts) > 1:
             raise UsageError(f'--is "{text}": no such role; {suggest(parts[0], list(ROLES))}')
-        if unit is not None and known_unit(unit) is None and not _fits(role or "other input", unit):
-            raise UsageError(f'--is "{text}": neither a role nor a unit; {suggest(parts[0], list(ROLES))}')
-        found[name] = (role, known_unit(unit) or unit if unit else None)
+        if unit is not None:
+            spelled, listed = unit_of(unit)
+            unit = listed or spelled
+            if listed is None and not _fits(role or "other input", unit):
+                what = f"no unit of a {role}" if role else "neither a role nor a unit"
+                raise UsageError(f'--is "{text}": {what}; {_meant(parts[0], role)}')
+        found[name] = (role, unit or None)
     return found, clock
 
 
@@ -135,6 +139,13 @@ def with_statements(
 
 def _usual(role: str) -> str:
     return (*ROLES[role].units, "1")[0]
+
+
+def _meant(word: str, role: str | None) -> str:
+    """What may have been meant: a role, or a unit of one that is known."""
+    if role is None:
+        return suggest(word, list(ROLES))
+    return f"a {role} is in {', '.join(ROLES[role].units)}, or in a unit of that dimension"
 
 
 def _fits(role: str, unit: str) -> bool:

@@ -11,6 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from discovery.cli import app
+from discovery.errors import UsageError
+from discovery.firsthour.asking import read_statements
 
 
 def _door(folder: Path, *more: str) -> tuple[str, dict[str, Any]]:
@@ -73,3 +75,20 @@ def test_one_cold_start_says_what_the_room_is_near(tmp_path: Path) -> None:
     campaign = tomllib.loads((tmp_path / "board" / "campaign.toml").read_text("utf-8"))
     assert 2.0 < campaign["channels"]["T_env"]["spread"] < 5.0
     assert campaign["recordings"]["run1"]["set"]["T_env"] == 29.1
+
+
+@pytest.mark.parametrize(
+    ("said", "unit"),
+    [("sun=other input,W/m2", "W/m**2"), ("feed=fluid flow,m3/h", "m**3/h"), ("T=degC", "degC")],
+)
+def test_a_unit_is_read_as_people_write_it(said: str, unit: str) -> None:
+    found, _ = read_statements([said])
+    assert [u for _, u in found.values()] == [unit]
+
+
+def test_a_unit_that_a_role_does_not_have_is_said_so() -> None:
+    """The role was right, and the message asked for a role."""
+    with pytest.raises(UsageError, match="no unit of a fluid flow; a fluid flow is in 1, l/min"):
+        read_statements(["feed=fluid flow,kg/s"])
+    with pytest.raises(UsageError, match="neither a role nor a unit"):
+        read_statements(["feed=quux"])
