@@ -1,4 +1,4 @@
-"""What an input may have done while nobody recorded it.
+"""What an input may have done while nobody recorded it: in gaps, and before a recording.
 
 A held input stands at its last value through a gap, another one runs straight. In truth it went on moving as
 it does elsewhere. In the middle of a gap of length G it is off by what it moves within G/2, or by how far it
@@ -52,6 +52,23 @@ def unknown_in_gaps(samples: Samples) -> Samples | None:
     size = np.zeros(len(time))
     size[np.searchsorted(time, begin)] = np.sqrt(length * apart)
     return Samples(time, size, False)
+
+
+def unknown_before(samples: Samples, seconds: float) -> Samples:
+    """How unsure a channel that arrives late by some seconds is until what was recorded first arrives, or of
+    one that arrives early, after what was recorded last; as `unknown_in_gaps`.
+
+    >>> power = Samples(60.0 * np.arange(21.0), np.arange(21.0) % 2, False)
+    >>> unknown_before(power, 300.0).at(np.array([299.0, 300.0])) > 0
+    array([ True, False])
+    """
+    begin, end, length = float(samples.time[0]), float(samples.time[-1]), abs(seconds)
+    time = np.linspace(begin, end, _ENOUGH)
+    moved = samples.at(np.minimum(time + length / 2, end)) - samples.at(time)
+    size = float(np.sqrt(length * np.mean(moved**2)))
+    if seconds > 0:
+        return Samples(np.array([begin, begin + length]), np.array([size, 0.0]), False)
+    return Samples(np.array([begin, end - length]), np.array([0.0, size]), False)
 
 
 def _apart(samples: Samples, gap: float) -> float:

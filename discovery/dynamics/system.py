@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from discovery.dynamics.memory import Memory
 from discovery.models import Model, expanded
 from discovery.models.model import read_at_start
 from discovery.recordings import Campaign
-from discovery.terms import Dual, Expression, Name, Program, compiled, degree, mixed
+from discovery.terms import Apply, Dual, Expression, Name, Program, Term, compiled, degree, mixed, rewrite
 from discovery.terms.dual import Value
 
 Array = NDArray[np.float64]
@@ -87,6 +87,20 @@ class System:
         """
         begin: dict[str, Value] = {name: float(series[0]) for name, series in self.grid.ends.items()}
         return begin, Memory(first_interval(self.grid), True)
+
+    @cached_property
+    def delays(self) -> tuple[tuple[Term, Apply], ...]:
+        """Terms that ask for what a channel was a while ago, each with that."""
+        found: list[tuple[Term, Apply]] = []
+
+        def noted(term: Term, apply: Apply) -> None:
+            channel = apply.arguments[0]
+            if apply.function == "delay" and isinstance(channel, Name) and channel.id in self.grid.samples:
+                found.append((term, apply))
+
+        for term in self.model.terms:
+            rewrite(term.expression, partial(noted, term))
+        return tuple(dict.fromkeys(found))
 
     def between(self, begin: int, end: int) -> System:
         """The system from one node to another, without readings; what remembers inputs begins there."""

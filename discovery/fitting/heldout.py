@@ -22,6 +22,7 @@ from discovery.dynamics import (
     start_values,
 )
 from discovery.dynamics.system import evened, inputs_of, shifted, uncertain
+from discovery.fitting.impulses import moved_in_gaps
 from discovery.fitting.kalman import innovations, whiten
 from discovery.fitting.noise import Noise
 from discovery.fitting.problem import read_spread
@@ -79,7 +80,7 @@ def predict_recording(
     if not any(unsure) or not len(grid.read):
         return trajectory
     residual = grid.readings - predict(trajectory)
-    shift = iter(_shift(trajectory, residual[:1], noise, unsure)[0].tolist())
+    shift = iter(_shift(residual[:1], noise, *_moved(trajectory, unsure)).tolist())
     inputs, own, starts = ({name: next(shift) for name in part} for part in unsure)
     if inputs:
         system = shifted(system, begun | {name: begun.get(name, 0.0) + by for name, by in inputs.items()})
@@ -99,7 +100,8 @@ def from_known_starts(
     """Residuals (R, Y) of a free run as they would be from the starts that all its readings show.
 
     A body that no sensor reads may begin far from what one first reading shows, and no model is better or
-    worse for that. Starts stay within their spread, and so do inputs known only within a spread.
+    worse for that, nor for what inputs did while nobody recorded them. Starts stay within their spread, and
+    so do inputs known only within a spread.
 
     Args:
         residual: readings minus model (R, Y).
@@ -111,10 +113,11 @@ def from_known_starts(
             colder, however much better a wrong model looks with it.
     """
     unsure = _unsure(run.system, white if reading is None else reading, known)
-    if not any(unsure) or not len(residual):
+    if not (any(unsure) or run.system.grid.silent or run.system.delays) or not len(residual):
         return residual
-    shift, moved = _shift(run, residual, white, unsure, together, farthest)
-    return residual - moved @ shift
+    parts = _moved(run, unsure), moved_in_gaps(run)
+    spread, moved = (np.concatenate(both, axis=-1) for both in zip(*parts, strict=True))
+    return residual - moved @ _shift(residual, white, spread, moved, together, farthest)
 
 
 def innovations_from_known_starts(run: Trajectory, residual: Array, noise: Noise) -> Array:
@@ -161,24 +164,25 @@ def _unsure(system: System, white: Array, known: Collection[str]) -> Unsure:
 
 
 def _shift(
-    run: Trajectory,
     residual: Array,
     white: Array,
-    unsure: Unsure,
+    spread: Array,
+    moved: Array,
     together: float = 1.0,
     farthest: float = inf,
-) -> tuple[Array, Array]:
-    """Most likely shifts (K,) of what is not known, in its order, given the first rows of a residual (N, Y),
-    and what the outputs answer to each, (N, Y, K). None is larger than so many spreads.
+) -> Array:
+    """Most likely shifts (K,) of what is not known, given the first rows of a residual (N, Y). None is larger
+    than so many spreads.
+
+    Args:
+        spread, moved: as of `_moved`.
     """
     seen = np.isfinite(residual)
-    spread, moved = _moved(run, unsure)
-    moved = moved[: len(residual)]
-    c = (moved / white[None, :, None])[seen]
+    c = (moved[: len(residual)] / white[None, :, None])[seen]
     gram = c.T @ c / together + np.diag(1 / spread**2)
     slope = -c.T @ (residual / white)[seen] / together
     ends = farthest * spread
-    return bounded_step(np.zeros(len(spread)), gram, slope, 0.0, -ends, ends), moved
+    return bounded_step(np.zeros(len(spread)), gram, slope, 0.0, -ends, ends)
 
 
 def _moved(run: Trajectory, unsure: Unsure) -> tuple[Array, Array]:

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.linalg import expm
 
-from discovery.dynamics import Grid, make_grid, predict
+from discovery.dynamics import Grid, Trajectory, make_grid, predict
 from discovery.fitting import Noise, fit_model, make_problem
+from discovery.fitting.impulses import inputs_in_gaps, late_switches, moved_in_gaps
 from discovery.fitting.kalman import make_filter
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
@@ -97,13 +99,19 @@ def test_an_input_that_stands_still_is_the_same_to_the_last_bit() -> None:
 
 
 def test_switches_that_come_each_by_another_time_are_whitened_as_a_dense_covariance_says() -> None:
-    """An impulse of g times step times jitter at the reading behind it, which dies as the body cools."""
+    """Heat that is a little more over the whole step, and more at one end of it than at the other, as a body
+    answers that cools by h fan meanwhile.
+    """
     r, jitter, white = logged(5, 0.0, 120), 0.3, 0.2
     problem = make_problem(model().with_values(TRUTH), campaign(r), ["r5"], grids=grids(campaign(r)))
     theta = np.array([23.0 if u.is_late else u.start for u in problem.unknowns])
     part = make_filter(problem.run(problem.systems[0], theta))
-    keep = np.exp(-TRUTH["h"] * INTERVAL * r.values["fan"][:-1])
-    answer = np.diag(np.diff(r.values["load"], prepend=r.values["load"][0]) * TRUTH["g"] * INTERVAL * jitter)
+    rate = TRUTH["h"] * r.values["fan"][:-1]
+    keep = np.exp(-rate * INTERVAL)
+    even = np.append(0.0, (1 - keep) / rate)
+    tilted = even - np.append(0.0, 2 / rate - 2 * (1 - keep) / (rate**2 * INTERVAL))
+    switched = np.diff(r.values["load"], prepend=r.values["load"][0]) * TRUTH["g"] * jitter
+    answer = np.concatenate([np.diag(switched * even), np.diag(switched * tilted * np.sqrt(3 / 5))], axis=1)
     for k in range(1, len(keep) + 1):
         answer[k] += keep[k - 1] * answer[k - 1]
     triangle = np.linalg.cholesky(answer @ answer.T + white**2 * np.eye(len(answer)))
@@ -111,3 +119,60 @@ def test_switches_that_come_each_by_another_time_are_whitened_as_a_dense_covaria
     found, logs = part.whitened(Noise(("T",), (white,), jitter=jitter), data)
     assert found == pytest.approx(np.linalg.solve(triangle, data[:, 0]), abs=1e-7)
     assert logs == pytest.approx(np.log(np.diag(triangle)))
+
+
+def test_a_switch_at_any_instant_of_a_step_moves_two_bodies_as_exact_runs_say() -> None:
+    """A stator of 90 s in a jacket of 6 s, read each minute, a load of 24 kW on or off: exact runs with 400
+    instants of the switch (matrix exponentials), against the covariance at the reading behind it.
+    """
+    capacity, across, water, power = np.array([60e3, 15e3]), 670.0, 2000.0, 24e3
+    a = np.array([[-across, across], [across, -across - water]]) / capacity[:, None]
+    time, load = INTERVAL * np.arange(11.0), np.where(np.arange(11) >= 5, power, 0.0)
+    channels = {n: Channel(n, "temperature", "K", 0.2, "linear") for n in ("stator", "jacket")}
+    channels["load"] = CHANNELS["load"]
+    run = Recording("r", time, {"load": load, "stator": np.zeros(11), "jacket": np.zeros(11)})
+    names = zip(("stator", "jacket"), capacity, strict=True)
+    states = {n: State(n, "K", c, parse("0"), 0.0, 1 / c) for n, c in names}
+    terms = (
+        Term("load", "stator", parse("load")),
+        Term("wall", "jacket", parse(f"{across}*(stator - jacket)"), "stator"),
+        Term("water", "jacket", parse(f"-{water}*jacket")),
+    )
+    seen = Campaign("c", channels, {"r": run})
+    grid = replace(make_grid(seen, "r", ["load"], ["stator", "jacket"]), unsure={"load": INTERVAL})
+    problem = make_problem(Model("two", {}, states, terms, {}), seen, ["r"], grids={"r": grid})
+    there = late_switches(problem.run(problem.systems[0], np.array([INTERVAL / 2])))[4] / 12
+    inverse = np.linalg.inv(a)
+    left = INTERVAL * (np.arange(400) + 0.5) / 400  # from the switch to the reading
+    exact = np.array([inverse @ (expm(a * t) - np.eye(2)) @ [power / capacity[0], 0.0] for t in left])
+    off = exact - exact.mean(axis=0)
+    assert np.sqrt(np.diag(there)) == pytest.approx(exact.std(axis=0), rel=0.1)
+    beyond = np.einsum("ri,ij,rj->r", off, np.linalg.inv(there + 0.2**2 * np.eye(2)), off)
+    assert beyond.max() < 9.0  # all within three standard deviations, the jacket, too
+
+
+@pytest.mark.parametrize("late", [120.0, -120.0])
+def test_what_an_input_was_before_the_recording_is_not_known(late: float) -> None:
+    """A load that arrives 120 s late is not known for so long; what it may have been moves the body as a load
+    that is a watt larger until then (the difference of two free runs).
+    """
+    r = logged(6, 0.0, 120)
+    unknown = r.time < 120.0 if late > 0 else r.time >= 7140.0 - 120.0
+    r = replace(r, values={**r.values, "more": np.where(unknown, 1.0, 0.0)})
+    channels = {**CHANNELS, "more": replace(CHANNELS["load"], name="more")}
+    seen = Campaign("c", channels, {r.name: r})
+
+    def run(heat: str) -> Trajectory:
+        problem = make_problem(model(heat).with_values(TRUTH), seen, ["r6"])
+        return problem.run(problem.systems[0], problem.start)
+
+    arriving = run(f"g*delay(load, {late})")
+    acts = inputs_in_gaps(arriving).any(axis=(1, 2))
+    assert np.flatnonzero(acts).tolist() == ([0, 1] if late > 0 else [117, 118])
+    spread, moved = moved_in_gaps(arriving)
+    every = np.linspace(0.0, 7140.0, 4000)
+    now, then = (r.values["load"][np.minimum(t // 60, 119).astype(int)] for t in (every, every + 60.0))
+    assert spread == pytest.approx([np.sqrt(np.mean((then - now) ** 2))], rel=1e-2)
+    larger = predict(run(f"g*(delay(load, {late}) + more)")) - predict(arriving)
+    assert moved[:, :, 0] == pytest.approx(larger, abs=1e-9)
+    assert not len(moved_in_gaps(run("g*load"))[0])

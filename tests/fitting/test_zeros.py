@@ -242,3 +242,29 @@ def test_a_room_that_is_known_within_a_spread_does_not_explain_what_is_far_beyon
         started = from_known_starts(run, residual, np.array([0.1]), farthest=3.0)
         # the start gives way, too: by three times its noise of 0.1 K
         assert started[:, 0] == pytest.approx(-left * fall, abs=0.35)
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_what_an_input_did_in_a_gap_is_no_miss_of_a_model(recorded: bool) -> None:
+    """A heater of 200 W that is on and off by the half hour: exact steps of a body of 10 kJ/K and 2 W/K. In a
+    gap of half an hour it was on, and the last row before it says off.
+    """
+    time: Array = 60.0 * np.arange(361.0)
+    power = np.where((time // 1800).astype(int) % 2 == 1, 200.0, 0.0)
+    body, keep = np.zeros(361), np.exp(-2.0 * 60.0 / 10e3)
+    for k in range(360):
+        body[k + 1] = 100.0 * power[k] / 200.0 + keep * (body[k] - 100.0 * power[k] / 200.0)
+    there = np.full(361, True) if recorded else (time <= 9000.0 - 60.0) | (time >= 10800.0)
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "body": Channel("body", "temperature", "K", 0.1, "linear"),
+    }
+    seen = Recording("a", time[there], {"P": power[there], "body": body[there]})
+    terms = (Term("heat", "body", parse("P")), Term("loss", "body", parse("-2*body")))
+    states = {"body": State("body", "K", 10e3, parse("0"), 0.0, 1 / 10e3)}
+    heated = Model("heated", {}, states, terms, {})
+    run = predict_recording(heated, Campaign("c", channels, {"a": seen}), "a", ["body"], [0.1])
+    left = run.system.grid.readings - predict(run)
+    started = from_known_starts(run, left, np.array([0.1]), farthest=2.0)
+    assert (np.abs(left).max() > 20.0) is not recorded
+    assert np.abs(started).max() < (0.01 if recorded else 1.5)
