@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.proof import Known
+from discovery.diagnosis.uphill import goes_uphill
 from discovery.diagnosis.walk import Node, walked
 from discovery.effects.hypothesis import Hypothesis, Key
 from discovery.evidence.bayes import Slab
@@ -56,7 +57,7 @@ class Scored:
     slab: Slab
     sizes: NDArray[np.intp]
     at: Array  # (A,) the amplitudes where the fit stands
-    outside: bool = False  # a shape presses against the end of its range: another law acts
+    outside: bool = False  # at the end of the range of a shape, or heat goes uphill: another law acts
     forced: str = ""  # what of unknown cause acts, too
     forced_state: str = ""  # the state that it heats
     log_odds_force: float = 0.0
@@ -75,7 +76,7 @@ class Scored:
     @property
     def acts(self) -> bool:
         """Whether its effects act: one that presses against zero does not, and at the end of the range of its
-        shape another law does.
+        shape, or where it takes heat from cold to warm, another law does.
         """
         return not self.outside and not (self.sizes < 0).any()
 
@@ -244,7 +245,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
         context.slab(free) if free else Slab(np.zeros(0), np.zeros(0), np.zeros(0)),
         np.array([moves.get(int(i), -1) for i in index], dtype=np.intp),
         fit.theta[index],
-        bool(shapes_at_end(chosen, fit)),
+        bool(shapes_at_end(chosen, fit)) or goes_uphill(chosen, fit),
     )
     # a fit that ended early is no part of the answer: its most likely noise says enough
     return _over_noise(context, bare, goal=inf if fit.ended_early else -inf)
