@@ -21,7 +21,7 @@ AIM_RULES, AIM_CONSTANTS = 15, 20
 TODAY_RULES, TODAY_CONSTANTS = 15, 20  # what a test holds
 
 RESOLUTION = {  # finer gives the same answer in more time
-    "evidence/bayes.py": "_BATCH _NARROW _ROUNDING",
+    "evidence/bayes.py": "_BATCH _NARROW ROUNDING",
     "evidence/events.py": "COARSE FINE CLOSER TOGETHER",
     "evidence/form_error.py": "LAWS PLACES INNER DEPTH",
     "evidence/latent_force.py": "BLOCKS SIZES MEMORY_BLOCKS",
@@ -33,6 +33,7 @@ RESOLUTION = {  # finer gives the same answer in more time
     "diagnosis/diagnose.py": "ANOTHER_NOISE",
     "diagnosis/posterior.py": "FAR MOST IN_PLAY SETTINGS",
     "diagnosis/coarse_bodies.py": "OPENED",
+    "diagnosis/crossvalidation.py": "_NONE",
     "diagnosis/proof.py": "DRAWS BLOCKS",
     "diagnosis/centred.py": "ROUNDS PARTS",
     "diagnosis/refit.py": "ENOUGH LONGEST ROUNDS",

@@ -32,6 +32,8 @@ from discovery.threads import side_by_side
 Array = NDArray[np.float64]
 Residuals = tuple[Array, Array]  # (R, Y) of a free run and of the filter
 
+_NONE = 1e-12  # squares of a block without readings
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -39,12 +41,14 @@ class LeftOut:
 
     `free`: rms of free runs in reading noises. `gains` (B,): by how much the model with the effects predicts
     each block of time better, in squares of what a reading says beyond those before it. `free_gains` (F,):
-    the same in squares of the free runs, in blocks as long as the residuals of these are correlated.
+    the same in squares of the free runs, in blocks as long as the residuals of these are correlated, and
+    `free_logs` (F,) the logarithms of their ratios.
     """
 
     free: Improvement
     gains: Array
     free_gains: Array = field(default_factory=lambda: np.zeros(0))
+    free_logs: Array = field(default_factory=lambda: np.zeros(0))
 
     @property
     def blocks(self) -> int:
@@ -61,7 +65,7 @@ class LeftOut:
         """Whether blocks get better by more than chance makes them: from one reading to the next, or, where
         process noise hides a slow law there, in free runs.
         """
-        return surely_better(self.gains) or surely_better(self.free_gains)
+        return surely_better(self.gains) or surely_better(self.free_gains, self.free_logs)
 
     @property
     def matters(self) -> bool:
@@ -161,21 +165,26 @@ def _compared(
     blocks: int,
 ) -> LeftOut:
     """Residuals of some outputs without and with effects, compared in so many blocks of each recording."""
-    one, runs, gains, free_gains = np.ones(len(mine)), list[FreeRuns](), list[Array](), list[Array]()
+    one, runs, gains = np.ones(len(mine)), list[FreeRuns](), list[Array]()
+    free_gains, free_logs = list[Array](), list[Array]()
     for r in (r for r in recordings if r in without):
         free, beyond = (z[:, mine] for z in without[r])
         then, after = (z[:, mine] for z in with_it[r]) if r in with_it else (None, None)
         runs.append(FreeRuns(free, then, 1.0, one))
-        gains.append(_gains(beyond, after, blocks))
+        old, new = _sums(beyond, after, blocks)
+        gains.append(old - new)
         together = max(readings_as_one([z]) for z in (free, then) if z is not None)
-        free_gains.append(_gains(free, then, max(1, int(len(free) / together))))
-    return LeftOut(improvement(runs, outputs), np.concatenate(gains), np.concatenate(free_gains))
+        old, new = _sums(free, then, max(1, int(len(free) / together)))
+        free_gains.append(old - new)
+        free_logs.append(np.log(np.maximum(old, _NONE) / np.maximum(new, _NONE)))
+    found = (np.concatenate(each) for each in (gains, free_gains, free_logs))
+    return LeftOut(improvement(runs, outputs), *found)
 
 
-def _gains(before: Array, after: Array | None, blocks: int) -> Array:
-    """By how much the sum of squares of each block of a recording falls; zero where a model runs away."""
+def _sums(before: Array, after: Array | None, blocks: int) -> tuple[Array, Array]:
+    """Sums of squares of each block of a recording; alike where a model runs away."""
     old, new, _ = block_sums(before, before if after is None else after, blocks)
-    return np.asarray(old - new)
+    return old, new
 
 
 def _residuals(

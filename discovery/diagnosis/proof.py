@@ -12,6 +12,7 @@ from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtr
 
 from discovery.diagnosis import thresholds
 from discovery.dynamics import Trajectory, predict, sensitivities
@@ -263,24 +264,44 @@ def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:
     return trajectory
 
 
-def surely_better(gains: Array) -> bool:
+def surely_better(gains: Array, logs: Array | None = None) -> bool:
     """Whether chance makes blocks of time better by such gains (B,) with a probability of 1 - SUREST at most:
     the signed-rank test (Wilcoxon, Biometrics Bulletin 1, 1945). An hour that goes badly wrong has the
     highest rank there, no more; in a mean it outweighs all others. Hours in which nothing happens have the
     lowest; in a count of better blocks they weigh as much as those in which an effect acts.
 
+    A few blocks are never enough for ranks, however much better each of them is.
+
+    Args:
+        logs: (B,) of the ratios of the squares, for Student's test of their mean (Biometrika 6 (1908) 1).
+
     >>> surely_better(np.array([3.0, 2.0, 5.0, -0.1, 4.0, 6.0, -0.2, 7.0]))
     True
     >>> surely_better(np.array([3.0, 2.0, 5.0, -9.0, 4.0, 6.0, -8.0, 7.0]))
     False
+    >>> surely_better(np.array([90.0, 50.0, 80.0]), np.array([4.0, 3.5, 4.5]))
+    True
     """
+    return min(_by_ranks(gains), 1.0 if logs is None else _by_mean(logs)) <= 1.0 - thresholds.SUREST
+
+
+def _by_ranks(gains: Array) -> float:
+    """Chance of the sum of the ranks of better blocks, where each is better or worse by chance."""
     gains = gains[gains != 0]
     _, place, count = np.unique(np.abs(gains), return_inverse=True, return_counts=True)
     twice = (2 * np.cumsum(count) - count + 1)[place]  # the rank; of equal ones, the mean of theirs
-    chance = np.ones(1)  # of each sum of ranks of better blocks, where a block is better or worse by chance
+    chance = np.ones(1)
     for rank in twice:
         chance = 0.5 * (np.pad(chance, (0, rank)) + np.pad(chance, (rank, 0)))
-    return bool(chance[twice[gains > 0].sum() :].sum() <= 1.0 - thresholds.SUREST)
+    return float(chance[twice[gains > 0].sum() :].sum())
+
+
+def _by_mean(logs: Array) -> float:
+    """Chance of the mean of such logarithms, where it is zero in truth."""
+    spread = float(np.std(logs, ddof=1)) if len(logs) > 1 else 0.0
+    if spread <= 0.0:
+        return 1.0
+    return float(stdtr(len(logs) - 1, -float(np.mean(logs)) * sqrt(len(logs)) / spread))
 
 
 def block_sums(before: Array, after: Array, blocks: int = BLOCKS) -> tuple[Array, Array, Array]:

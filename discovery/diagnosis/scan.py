@@ -28,13 +28,15 @@ class Scan:
     """Candidates scored on the residual of a model, best odds first, and on that without one effect.
 
     `quiet`: as if there were little process noise and no form error, where the most likely ones are larger:
-    they may have absorbed the missing physics, and leave nothing to any candidate. `inside`: likewise, with
-    parameters that press against a bound where their author believes them.
+    they may have absorbed the missing physics, and leave nothing to any candidate. `elsewhen`: events at the
+    instants that are most likely then. `inside`: as `quiet`, with parameters that press against a bound where
+    their author believes them.
     """
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
     quiet: tuple[Score, ...] = ()
+    elsewhen: tuple[Score, ...] = ()
     inside: tuple[Score, ...] = ()
 
 
@@ -44,7 +46,8 @@ def scan_model(context: Context, current: Scored) -> Scan:
     offered = [h for h in offered if h.effect.search != "single readings"]
     settings = in_play(context, current)
     events = [h for h in offered if h.effect.search in ("window", "step")]
-    placed = place_events(current.seen, settings[0], events, [context.slab([h]) for h in events])
+    slabs = [context.slab([h]) for h in events]
+    placed = place_events(current.seen, settings[0], events, slabs)
     there = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
     moved = [one for h in there for one in with_shapes(h)]
     lasting = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
@@ -57,8 +60,18 @@ def scan_model(context: Context, current: Scored) -> Scan:
         tuple(found.claims),
         {h.key: tuple(claims) for h, claims in by_effect},
         tuple(found.quiet) if len(settings) > 1 else (),
+        tuple(_elsewhen(context, current, settings[-1], events)) if len(settings) > 1 else (),
         tuple(scan(within, settings[-1:], every, context.slab(every)).claims) if within else (),
     )
+
+
+def _elsewhen(
+    context: Context, current: Scored, setting: Setting, events: Sequence[Hypothesis]
+) -> list[Score]:
+    """Events at the instants that are most likely under a noise, scored under it."""
+    slabs = [context.slab([h]) for h in events]
+    placed = place_events(current.seen, setting, events, slabs)
+    return scan(current.seen, [setting], placed, context.slab(placed)).claims
 
 
 def inside(context: Context, current: Scored) -> Whitened | None:

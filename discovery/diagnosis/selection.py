@@ -172,9 +172,20 @@ class Search:
             best = max(ways, key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
-            current = best
+            current = self._begun_anew(best)
             self.tell(f"{best.hypotheses[-1].effect.title}, {best.hypotheses[-1].where}")
         return current
+
+    def _begun_anew(self, one: Scored) -> Scored:
+        """A model fitted once more from the start values of its author, if that is more likely: without the
+        effect, a fit may have ended where it cuts a body off, and it does not come back by itself.
+        """
+        problem, noise = one.fit.problem, one.noise
+        own = {u.name: u.start for u in problem.unknowns if u.recording is None and not u.is_nuisance}
+        found = one.fit.model.parameters
+        own |= {n: found[n].value for h in one.hypotheses for n in (*h.amplitudes, *h.shapes)}
+        again = score(self.context, one.hypotheses, noise, one.fit, own, self.goal(noise))
+        return max(one, self.keep(again), key=lambda each: each.evidence) if again else one
 
     def _added(self, current: Scored) -> Scored:
         """The best refit with one of the best candidates; `current` if none is better. Candidates that run
@@ -186,7 +197,8 @@ class Search:
             return [c for c in claims if own | {c.hypothesis.key} not in self.lost]
 
         while True:
-            further = (claim for other in (scan.quiet, scan.inside) for claim in hopeful(left(other), RIVALS))
+            others = scan.quiet, scan.elsewhen, scan.inside
+            further = (claim for other in others for claim in hopeful(left(other), RIVALS))
             pool = [*hopeful(left(scan.claims), REFITS), *further]
             before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)
             if len(self.lost) == before:
@@ -286,9 +298,9 @@ class Search:
         own, pool = [o.key for o in others], not_twice(pool, others)
         keys = [frozenset((*own, claim.hypothesis.key)) for claim in pool]
         known = {*self.tried, *self.lost}
-        # an effect may have several formulas at a place
+        # an effect may have several formulas at a place, and an event other instants under other noise
         fresh = {
-            (key, claim.hypothesis.amplitudes): claim
+            (key, claim.hypothesis.amplitudes, _instants(claim.hypothesis)): claim
             for key, claim in zip(keys, pool, strict=True)
             if key not in known
         }
@@ -300,7 +312,7 @@ class Search:
         for one in side_by_side(tried, list(fresh.values())):
             if one is not None:
                 self.keep(one)
-        self.lost |= {key for key, _ in fresh if key not in self.tried}
+        self.lost |= {key for key, *_ in fresh if key not in self.tried}
         while True:
             among = [self.tried[key] for key in keys if key in self.tried]
             best = max([start, *among], key=lambda one: one.evidence)
@@ -312,6 +324,10 @@ class Search:
         """Cost of a fit from which it can be part of the answer, or `below` it in log evidence."""
         best = self.best.fit
         return FAR + below + cost_under(best.problem, best.theta, best.trajectories, noise)
+
+
+def _instants(h: Hypothesis) -> tuple[float, ...]:
+    return tuple(h.shapes[name] for name in h.instants)
 
 
 def _of_model(h: Hypothesis, one: Scored) -> Score:

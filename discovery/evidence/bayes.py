@@ -33,7 +33,7 @@ _WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
 _FINE = np.linspace(-3.5, 3.5, 43)  # standard deviations of the logarithm, for flat likelihoods
 _NARROW = 4.0  # standard deviations from zero beyond which the posterior is taken as Gaussian
 _BATCH = 256  # hypotheses whose signatures are whitened at a time
-_ROUNDING = 1e-9  # of the square of a signature: what is left of less is lost in the last digits
+ROUNDING = 1e-9  # of the square of a signature: what is left of less is lost in the last digits
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def projected(z: Array, gone: Absorbed) -> Projected:
     inside = gone.basis.T @ z
     length = np.einsum("na,na->a", z, z)
     left = length - np.einsum("ua,ua->a", inside, inside)
-    gram = np.maximum(left, _ROUNDING * length)  # of what a refit absorbs whole, rounding is left
+    gram = np.maximum(left, ROUNDING * length)  # of what a refit absorbs whole, rounding is left
     return Projected(z, inside, z.T @ gone.residual - inside.T @ gone.slope, gram, np.sqrt(length))
 
 
@@ -244,7 +244,7 @@ class Products:
 def products(part: Projected, hypotheses: Sequence[Hypothesis]) -> Products:
     """Inner products of the signatures of hypotheses, in their order."""
     edges = np.concatenate([[0], np.cumsum([len(h.amplitudes) for h in hypotheses])]).tolist()
-    least = _ROUNDING * (part.length**2 + 1e-30)
+    least = ROUNDING * (part.length**2 + 1e-30)
     matrices = tuple(
         np.maximum(part.gram[a:b], least[a:b])[:, None]
         if b - a == 1
@@ -317,7 +317,7 @@ def _jointly(matrix: Array, dot: Array, slab: Slab) -> float:
     """
     scale = np.sqrt(np.diag(matrix))
     sizes, axes = np.linalg.eigh(matrix / np.outer(scale, scale))
-    sizes = np.maximum(sizes, _ROUNDING)  # two signatures may look the same
+    sizes = np.maximum(sizes, ROUNDING)  # two signatures may look the same
     inverse = axes / sizes @ axes.T / np.outer(scale, scale)
     at = inverse @ dot
     wrong = (at * slab.sign < 0) & (np.abs(at) > np.sqrt(np.diag(inverse)))

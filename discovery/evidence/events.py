@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.effects.candidates import with_shapes
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Projected, Slab, project_one
+from discovery.evidence.bayes import ROUNDING, Projected, Slab, project_one
 from discovery.evidence.outliers import MOST
 from discovery.evidence.settings import Setting
 from discovery.evidence.signatures import Claims, signatures
@@ -138,7 +138,9 @@ class _Search:
         part, count = self.projected(event_steps(self.trajectory, h, instants)), len(instants)
         matrix = part.block(range(count))
         diagonal = np.diag(matrix)
-        gram = np.maximum(diagonal[:, None] + diagonal[None, :] - 2 * matrix, 1e-30)
+        # between two instants nothing may act, and the difference of two responses is rounding
+        least = ROUNDING * float(diagonal.max()) + 1e-30
+        gram = np.maximum(diagonal[:, None] + diagonal[None, :] - 2 * matrix, least)
         dot = np.subtract.outer(part.dot, part.dot)
         upper = np.triu_indices(count, 1)
         flat = Slab(*(np.broadcast_to(v, len(upper[0])) for v in (slab.median, slab.factor, slab.sign)))

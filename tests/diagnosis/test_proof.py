@@ -8,7 +8,7 @@ from math import exp, inf, sqrt
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.stats import binom, wilcoxon
+from scipy.stats import binom, ttest_1samp, wilcoxon
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.proof import (
@@ -236,6 +236,23 @@ def test_of_gains_that_are_alike_their_number_counts(better: int, sure: bool) ->
     assert surely_better(gains) is sure
     assert surely_better(gains[::-1]) is sure
     assert bool(binom.sf(better - 1, 16, 0.5) <= 1.0 - thresholds.SUREST) is sure
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_a_few_blocks_are_enough_where_each_is_far_better(count: int) -> None:
+    """Ranks of five blocks never say so (3 %); Student's test as of scipy."""
+    rng = np.random.default_rng(count)
+    decided = set()
+    for shift in np.linspace(0.0, 8.0, 40):
+        logs = 0.3 * rng.standard_normal(count) + shift
+        gains = np.exp(logs) - 1.0
+        chance = ttest_1samp(logs, 0.0, alternative="greater").pvalue
+        assert surely_better(gains, logs) == (chance <= 1.0 - thresholds.SUREST)
+        assert not surely_better(gains)
+        decided.add(surely_better(gains, logs))
+    assert decided == {False, True}
+    assert not surely_better(np.ones(1), np.array([50.0]))
+    assert not surely_better(np.zeros(3), np.zeros(3))
 
 
 def test_blocks_that_are_no_other_count_neither_way() -> None:

@@ -74,27 +74,66 @@ def test_what_grew_is_questioned_under_another_noise(monkeypatch: pytest.MonkeyP
     assert "fluid_convection" in {h.effect.word for h in current.hypotheses}
 
 
-@pytest.mark.parametrize("likely", ["warms", "moves"])
-def test_each_formula_of_an_effect_is_refitted(likely: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("likely", [("warms", 0.0), ("moves", 0.0), ("moves", 3600.0)])
+def test_each_formula_and_each_instant_of_an_effect_is_refitted(
+    likely: tuple[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A hidden mass may warm its body or move an error by itself. The last in the pool took the place of the
-    other: on the frame of a printer it had -2153 log evidence, and the other -1826.
+    other: on the frame of a printer it had -2153 log evidence, and the other -1826. Under little process
+    noise an event may have other instants.
     """
 
     def refit(*arguments: object) -> Scored:
-        claim = cast(Score, arguments[3])
-        evidence = 100.0 if claim.hypothesis.amplitudes == (likely,) else 50.0
+        h = cast(Score, arguments[3]).hypothesis
+        evidence = 100.0 if (h.amplitudes[0], h.shapes["t"]) == likely else 50.0
         one = SimpleNamespace(keys=frozenset({"mass"}), evidence=evidence, hypotheses=(), fit=ENDED)
         return cast(Scored, one)
 
     monkeypatch.setattr(selection, "attempt", refit)
     monkeypatch.setattr(selection, "light", lambda one: one)
     start = cast(Scored, SimpleNamespace(keys=frozenset(), evidence=0.0))
-    pool = [
-        SimpleNamespace(hypothesis=SimpleNamespace(key="mass", amplitudes=(a,))) for a in ("warms", "moves")
+    offered = [("warms", 0.0), ("moves", 3600.0), ("moves", 0.0)]
+    claims = [
+        SimpleNamespace(key="mass", amplitudes=(a,), instants=("t",), shapes={"t": t}) for a, t in offered
     ]
+    pool = [SimpleNamespace(hypothesis=h) for h in claims]
     found = Search(dry())
     assert found._refitted(start, [], cast(list[Score], pool)).evidence == 100.0
     assert [one.evidence for one in found.tried.values()] == [100.0]
+
+
+@pytest.mark.parametrize(("again", "evidence"), [(190.0, 190.0), (40.0, 58.0), (None, 58.0)])
+def test_what_grew_is_fitted_from_the_start_values_of_the_author_too(
+    again: float | None, evidence: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A loom: without the heat of its floor the fit cut the reed off, and with it 58 units stood for 190."""
+    begun: list[dict[str, float]] = []
+    unknowns = [
+        SimpleNamespace(name="G", recording=None, is_nuisance=False, start=5.7),
+        SimpleNamespace(name="zero", recording="r1", is_nuisance=False, start=0.0),
+        SimpleNamespace(name="heat", recording=None, is_nuisance=False, start=1.0),
+    ]
+    parameters = {"G": SimpleNamespace(value=0.0), "heat": SimpleNamespace(value=11.6)}
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(unknowns=unknowns), model=SimpleNamespace(parameters=parameters)
+    )
+    h = SimpleNamespace(key="floor", amplitudes=("heat",), shapes={})
+
+    def model(found: float) -> Any:
+        keys = frozenset({"floor"})
+        return SimpleNamespace(hypotheses=(h,), keys=keys, evidence=found, fit=fit, noise=None)
+
+    def refit(*arguments: Any) -> Any:
+        begun.append(arguments[4])
+        return None if again is None else model(again)
+
+    monkeypatch.setattr(selection, "score", refit)
+    monkeypatch.setattr(selection, "light", lambda one: one)
+    monkeypatch.setattr(Search, "goal", lambda _, _noise: 0.0)
+    found = Search(dry())
+    one = found.keep(model(58.0))
+    assert found._begun_anew(one).evidence == evidence
+    assert begun == [{"G": 5.7, "heat": 11.6}]
 
 
 @pytest.mark.parametrize(("coarse", "begun"), [(True, ["heat", "mass"]), (False, ["heat"])])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from discovery.effects.form import Shape
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.scene import Scene
 from discovery.evidence.bayes import Slab, project, project_one, scan
-from discovery.evidence.events import LEAST, _span, event_steps, heat_steps, place_events
+from discovery.evidence.events import LEAST, _Search, _span, event_steps, heat_steps, place_events
 from discovery.evidence.settings import Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened
@@ -184,3 +185,21 @@ def test_heat_neither_begins_nor_ends_beside_the_ends_of_a_recording(wrong: int)
     for edge in placed(few, "unmeasured_heat", noise).shapes.values():
         beside = int(np.sum(few.time <= edge)), int(np.sum(few.time >= edge))
         assert min(beside) >= LEAST or edge in (few.time[0], few.time[-1])
+
+
+def test_where_nothing_acts_there_is_no_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A print head that stood still: between two instants there, what its heater may have missed does
+    nothing, and the difference of two large responses is rounding. The closer look at an event ended there.
+    """
+    rng, count = np.random.default_rng(0), 12
+    rounding = rng.standard_normal((count, count))
+    part = SimpleNamespace(
+        dot=3e5 + 1e-5 * rng.standard_normal(count),
+        block=lambda some: (1e7 + 1e-9 * (rounding + rounding.T))[np.ix_(some, some)],
+    )
+    seen = seen_of(machine.simulated(1), machine.simulated(2))
+    h = next(c for c in machine.claims(machine.model(), "input_missed") if "P_drive in r1" in c.stated)
+    search = _Search(seen, SETTING, "r1")
+    monkeypatch.setattr(search, "projected", lambda _: part)
+    gains = search._windows(h, np.linspace(40000.0, 50000.0, count), SLAB)
+    assert gains[np.triu_indices(count, 1)].max() < 1.0
