@@ -172,20 +172,9 @@ class Search:
             best = max(ways, key=lambda one: one.evidence)
             if best.evidence <= current.evidence:
                 break
-            current = self._begun_anew(best)
+            current = best
             self.tell(f"{best.hypotheses[-1].effect.title}, {best.hypotheses[-1].where}")
         return current
-
-    def _begun_anew(self, one: Scored) -> Scored:
-        """A model fitted once more from the start values of its author, if that is more likely: without the
-        effect, a fit may have ended where it cuts a body off, and it does not come back by itself.
-        """
-        problem, noise = one.fit.problem, one.noise
-        own = {u.name: u.start for u in problem.unknowns if u.recording is None and not u.is_nuisance}
-        found = one.fit.model.parameters
-        own |= {n: found[n].value for h in one.hypotheses for n in (*h.amplitudes, *h.shapes)}
-        again = score(self.context, one.hypotheses, noise, one.fit, own, self.goal(noise))
-        return max(one, self.keep(again), key=lambda each: each.evidence) if again else one
 
     def _added(self, current: Scored) -> Scored:
         """The best refit with one of the best candidates; `current` if none is better. Candidates that run

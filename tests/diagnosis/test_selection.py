@@ -102,40 +102,6 @@ def test_each_formula_and_each_instant_of_an_effect_is_refitted(
     assert [one.evidence for one in found.tried.values()] == [100.0]
 
 
-@pytest.mark.parametrize(("again", "evidence"), [(190.0, 190.0), (40.0, 58.0), (None, 58.0)])
-def test_what_grew_is_fitted_from_the_start_values_of_the_author_too(
-    again: float | None, evidence: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A loom: without the heat of its floor the fit cut the reed off, and with it 58 units stood for 190."""
-    begun: list[dict[str, float]] = []
-    unknowns = [
-        SimpleNamespace(name="G", recording=None, is_nuisance=False, start=5.7),
-        SimpleNamespace(name="zero", recording="r1", is_nuisance=False, start=0.0),
-        SimpleNamespace(name="heat", recording=None, is_nuisance=False, start=1.0),
-    ]
-    parameters = {"G": SimpleNamespace(value=0.0), "heat": SimpleNamespace(value=11.6)}
-    fit = SimpleNamespace(
-        problem=SimpleNamespace(unknowns=unknowns), model=SimpleNamespace(parameters=parameters)
-    )
-    h = SimpleNamespace(key="floor", amplitudes=("heat",), shapes={})
-
-    def model(found: float) -> Any:
-        keys = frozenset({"floor"})
-        return SimpleNamespace(hypotheses=(h,), keys=keys, evidence=found, fit=fit, noise=None)
-
-    def refit(*arguments: Any) -> Any:
-        begun.append(arguments[4])
-        return None if again is None else model(again)
-
-    monkeypatch.setattr(selection, "score", refit)
-    monkeypatch.setattr(selection, "light", lambda one: one)
-    monkeypatch.setattr(Search, "goal", lambda _, _noise: 0.0)
-    found = Search(dry())
-    one = found.keep(model(58.0))
-    assert found._begun_anew(one).evidence == evidence
-    assert begun == [{"G": 5.7, "heat": 11.6}]
-
-
 @pytest.mark.parametrize(("coarse", "begun"), [(True, ["heat", "mass"]), (False, ["heat"])])
 def test_a_coarse_answer_is_sought_from_another_beginning_too(
     coarse: bool, begun: list[str], monkeypatch: pytest.MonkeyPatch
