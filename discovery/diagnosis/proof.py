@@ -12,7 +12,6 @@ from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
 
 from discovery.diagnosis import thresholds
 from discovery.dynamics import Trajectory, predict, sensitivities
@@ -298,6 +297,8 @@ def _by_ranks(gains: Array) -> float:
 
 def _by_mean(logs: Array) -> float:
     """Chance of the mean of such logarithms, where it is zero in truth."""
+    from scipy.special import stdtr  # most commands need no proof
+
     spread = float(np.std(logs, ddof=1)) if len(logs) > 1 else 0.0
     if spread <= 0.0:
         return 1.0

@@ -28,15 +28,15 @@ class Scan:
     """Candidates scored on the residual of a model, best odds first, and on that without one effect.
 
     `quiet`: as if there were little process noise and no form error, where the most likely ones are larger:
-    they may have absorbed the missing physics, and leave nothing to any candidate. `elsewhen`: events at the
-    instants that are most likely then. `inside`: as `quiet`, with parameters that press against a bound where
-    their author believes them.
+    they may have absorbed the missing physics, and leave nothing to any candidate. `quiet_events`: events at
+    the instants that are most likely then. `inside`: as `quiet`, with parameters that press against a bound
+    where their author believes them.
     """
 
     claims: tuple[Score, ...]
     without: Mapping[Key, tuple[Score, ...]]
     quiet: tuple[Score, ...] = ()
-    elsewhen: tuple[Score, ...] = ()
+    quiet_events: tuple[Score, ...] = ()
     inside: tuple[Score, ...] = ()
 
 
@@ -60,12 +60,12 @@ def scan_model(context: Context, current: Scored) -> Scan:
         tuple(found.claims),
         {h.key: tuple(claims) for h, claims in by_effect},
         tuple(found.quiet) if len(settings) > 1 else (),
-        tuple(_elsewhen(context, current, settings[-1], events)) if len(settings) > 1 else (),
+        tuple(_quiet_events(context, current, settings[-1], events)) if len(settings) > 1 else (),
         tuple(scan(within, settings[-1:], every, context.slab(every)).claims) if within else (),
     )
 
 
-def _elsewhen(
+def _quiet_events(
     context: Context, current: Scored, setting: Setting, events: Sequence[Hypothesis]
 ) -> list[Score]:
     """Events at the instants that are most likely under a noise, scored under it."""

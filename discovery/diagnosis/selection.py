@@ -186,7 +186,7 @@ class Search:
             return [c for c in claims if own | {c.hypothesis.key} not in self.lost]
 
         while True:
-            others = scan.quiet, scan.elsewhen, scan.inside
+            others = scan.quiet, scan.quiet_events, scan.inside
             further = (claim for other in others for claim in hopeful(left(other), RIVALS))
             pool = [*hopeful(left(scan.claims), REFITS), *further]
             before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)

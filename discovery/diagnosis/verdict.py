@@ -218,8 +218,8 @@ def _instead(found: Search, lost: Collection[Key], n: Named, whole: float) -> fl
     """What a model of names has to exceed where one of them may be another effect: the best of all models
     that do not claim it, and without rivals that are named next to it as they are nearly as likely. Where
     effects that are not sure add more than a name needs, only a model counts that the best one does not
-    exceed by as much. One with as many effects as that one is compared with it: both are helped by effects
-    that are not sure.
+    exceed by as much. One with as many effects as that one is compared with it, if it claims the effect: both
+    are helped by effects that are not sure.
 
     Args:
         lost: effects that are no rivals.
@@ -228,8 +228,10 @@ def _instead(found: Search, lost: Collection[Key], n: Named, whole: float) -> fl
     none = {*n.near, *lost}
     others = (m for m in found.tried.values() if none.isdisjoint(m.keys) and not claims(m, n.hypothesis))
     more = found.best.evidence - whole
-    fewer = max(more - thresholds.SHORT, 0.0)
-    return max(m.evidence - (more if len(m.keys) >= len(found.best.keys) else fewer) for m in others)
+    fewer, as_many = max(more - thresholds.SHORT, 0.0), len(found.best.keys)
+    if not claims(found.best, n.hypothesis):
+        return max(m.evidence for m in others) - fewer
+    return max(m.evidence - (more if len(m.keys) >= as_many else fewer) for m in others)
 
 
 def _needed(

@@ -322,6 +322,16 @@ def test_a_rival_with_as_many_effects_is_compared_with_the_best() -> None:
     assert [n.hypothesis for n in found.named] == [FLUID]
 
 
+def test_a_best_model_without_the_name_is_no_help_for_it() -> None:
+    """The name is of a model that is as good over all widths of the priors; the best one does not have it."""
+    mass = claim("second_thermal_mass", "bed")
+    best = Model((mass, FRICTION), 112.0)
+    tried = Tried((Model((FLUID,), 100.0), best, Model((FLUID, FRICTION), 111.0), Model((), 0.0)))
+    name = cast(Any, SimpleNamespace(hypothesis=FLUID, near=frozenset()))
+    assert tried.best is best
+    assert verdict._instead(cast(Any, tried), (), name, 100.0) == 112.0
+
+
 @pytest.mark.parametrize(("word", "named"), [("fluid_convection", True), ("rotating_air_convection", False)])
 def test_an_effect_by_another_of_its_inputs_is_no_rival(word: str, named: bool) -> None:
     """The demonstration: the fluid at the table by the flow, and by the pump next to unsure friction."""
