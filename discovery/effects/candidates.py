@@ -11,10 +11,10 @@ from math import log
 from discovery.effects.form import INPUT, LEVEL, OF_INPUTS, RATE, REPLACED, ROLE_OF, TERM, Effect
 from discovery.effects.hypothesis import BEFORE, Hypothesis
 from discovery.effects.places import Spot, spots
-from discovery.effects.scene import Scene, channels_for, recordings_for
+from discovery.effects.scene import Scene, channels_for, is_flow_unit, recordings_for
 from discovery.models import Model
 from discovery.models.model import TIME_UNITS
-from discovery.models.units import differences, dimension, ratio, same_dimension
+from discovery.models.units import differences, dimension, ratio
 from discovery.recordings import Channel
 from discovery.recordings.roles import ROLES
 from discovery.terms import (
@@ -338,4 +338,5 @@ def _flow_unit(h: Hypothesis, channels: Mapping[str, Channel]) -> str:
     if "flow" not in names(rewrite(formula, lambda f: Number(1.0) if f.function == "sign" else None)):
         return ""
     used = {name for term in h.terms for name in names(term.expression)} & set(channels)
-    return next((f"/({u})" for n in sorted(used) if same_dimension(u := channels[n].unit, "l/min")), "")
+    units = [channels[n].unit for n in sorted(used)]
+    return next((f"/({u})" for u in units if is_flow_unit(u)), "")

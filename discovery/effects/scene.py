@@ -10,6 +10,7 @@ from discovery.effects.places import TEMPERATURES
 from discovery.models import Model
 from discovery.models.units import same_dimension
 from discovery.recordings import Channel
+from discovery.recordings.roles import FLOWS
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,12 @@ def channels_for(variable: str, effect: Effect, model: Model, scene: Scene) -> l
 
 
 def _is_flow(channel: Channel) -> bool:
-    return channel.role == "fluid flow" or same_dimension(channel.unit, "l/min")
+    return channel.role == "fluid flow" or is_flow_unit(channel.unit)
+
+
+def is_flow_unit(unit: str) -> bool:
+    """Whether a unit is one of volume or of mass in a time."""
+    return any(same_dimension(unit, flow) for flow in FLOWS)
 
 
 def _is_second(name: str, scene: Scene) -> bool:

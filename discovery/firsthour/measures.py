@@ -34,6 +34,10 @@ _SPELLED = {
     "mm/m": "mm/m mrad",
     "l/min": "nl/min nl/m nlpm nlm ln/min slm sl/min "
     "l/min lpm l/m liter/min litre/min lit/min l/min. l·min-1 l/分 slpm",
+    "kg/min": "kg/min",
+    "kg/s": "kg/s kg·s-1",
+    "g/s": "g/s",
+    "kg/h": "kg/h kg/hr",
     "l/h": "l/h lph liter/h l/hr",
     "m**3/h": "m3/h m^3/h m³/h cbm/h",
     "m**3/s": "m3/s m³/s",
@@ -299,6 +303,7 @@ _ODDS: dict[str, Mapping[str, float]] = {
     "m": {"position": 9, "displacement": -1},
     "um/m": {"displacement": 9, "correction": 7},
     "l/min": {"flow": 12},
+    "kg/min": {"flow": 12},
     "percent": {
         "signal": 3,
         "flow": 1.5,

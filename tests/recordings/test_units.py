@@ -22,6 +22,7 @@ from discovery.recordings.units import UnitError, conversion, parse_unit
         ("%", "heat load", 40.0, 40.0, "percent"),
         ("%", "fluid flow", 50.0, 0.5, "1"),
         ("m^3/h", "fluid flow", 0.6, 10.0, "l/min"),
+        ("kg/s", "fluid flow", 0.5, 30.0, "kg/min"),
         ("1/min", "rotation speed", 600.0, 600.0, "rpm"),
         ("Hz", "rotation speed", 10.0, 600.0, "rpm"),
         ("rad/s", "rotation speed", 2 * math.pi, 60.0, "rpm"),
