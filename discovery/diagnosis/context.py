@@ -31,6 +31,7 @@ from discovery.models import Model
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
+Kinds = tuple[int, int, int, int]  # form errors of laws, places, zeros of thermometers, air at bodies
 
 MOST_READINGS = 4000  # instants, over all recordings
 NODES = 1000  # of a recording, about, and its readings: inputs are their means in between
@@ -65,9 +66,8 @@ class Context:
     floor: Mapping[str, float]  # of the process noise of each state at level one
     belief: float  # log of the factor within which its start values are known
     outliers: tuple[Outlier, ...]  # set aside
-    form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the model, for a share of one
-    kinds: tuple[int, int, int, int]  # of these: of laws, places, zeros of thermometers, air at bodies
-    formed: Fit  # where they are
+    form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the baseline, for a share of one
+    kinds: Kinds
     thermometers: tuple[str, ...]  # that the model uses or shows
     sizes: Sizes  # prior of amplitudes, along the baseline; the same under every reading noise
 
@@ -98,6 +98,15 @@ class Context:
     def candidates(self) -> list[Hypothesis]:
         """Every effect at every place of the model where it can act."""
         return candidates(self.model, self.effects, self.scene)
+
+    def form_of(self, fit: Fit) -> tuple[tuple[Array, ...], Kinds]:
+        """Form errors of a fitted model, and of what kinds: those of the baseline, or its own where its bodies
+        are others. A share of flows that a model does not have excuses nothing.
+        """
+        if not are_others(self.baseline.trajectories, fit.trajectories):
+            return self.form, self.kinds
+        form, kinds = model_form(fit, np.array(self.white.white), self.thermometers, ambient_of(self.campaign))
+        return tuple(form), kinds
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
         """Prior of the size of each amplitude."""
@@ -171,7 +180,6 @@ def make_context(
         tuple(outliers),
         tuple(form),
         kinds,
-        fit,
         thermometers,
         Sizes(model, fit.trajectories, noises.white),
     )
@@ -188,17 +196,10 @@ def _thermometers(fit: Fit, campaign: Campaign) -> tuple[str, ...]:
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise of a better fit, if the campaign states none, and with the form
-    errors of its bodies, where they are others: a fit without an effect may link two bodies a thousand times
-    as well as they are.
-    """
+    """The context with the reading noise of a better fit, if the campaign states none."""
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
-    noises = _settings(white, context.floor, context.grids, context.settings.coarser)
-    if not are_others(context.formed.trajectories, fit.trajectories):
-        return replace(context, settings=noises)
-    form, kinds = model_form(fit, np.array(white.white), context.thermometers, ambient_of(context.campaign))
-    return replace(context, settings=noises, form=tuple(form), kinds=kinds, formed=fit)
+    return replace(context, settings=_settings(white, context.floor, context.grids, context.settings.coarser))
 
 
 def with_coarser(context: Context, states: tuple[str, ...]) -> Context:

@@ -19,7 +19,7 @@ from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.own import Searched, searched
-from discovery.diagnosis.posterior import IN_PLAY, Posterior, posterior
+from discovery.diagnosis.posterior import FAR, IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
 from discovery.diagnosis.repair import with_repair
 from discovery.diagnosis.response import Response, responses
@@ -201,6 +201,7 @@ def diagnose(
         found = _under_own_noise(found, tell)
         found.run()
     context = found.context
+    found.finish_near(FAR)
     tell("weighing the answers")
     chances = posterior(context, [*found.tried.values(), *_unknown(context, found)])
     tell("proving in free runs")
@@ -275,15 +276,14 @@ def _with_coarse_bodies(found: Search) -> Search:
 
 
 def _under_own_noise(found: Search, tell: Callable[[str], None]) -> Search:
-    """The search under the reading noise that the best model leaves, with the form errors of its bodies, and
-    with those that it leaves coarse, where they are others.
+    """The search under the reading noise that the best model leaves, and with bodies that it leaves coarse,
+    where they are others.
     """
     found = _with_coarse_bodies(found)
     before = found.context
     other = with_noise_of(before, found.best.fit)
     change = np.log(np.array(other.white.white) / np.array(before.white.white))
-    is_other = other.form is not before.form or np.max(np.abs(change)) > ANOTHER_NOISE
-    if not found.best.hypotheses or not is_other:
+    if not found.best.hypotheses or np.max(np.abs(change)) <= ANOTHER_NOISE:
         return found
     tell("repeating with the noise of the answer")
     return found.under(other)

@@ -156,6 +156,13 @@ class Search:
         else:
             self.tried[one.keys] = _lighter(whole)
 
+    def finish_near(self, within: float) -> None:
+        """Fit to the end what takes part in the answer: a fit that ended early only promises its evidence."""
+        early = [one for one in self.tried.values() if one.fit.ended_early]
+        for one in early:
+            if one.evidence > self.best.evidence - within:
+                self.finish(one)
+
     def scanned(self, one: Scored) -> Scan:
         """The scan of a model."""
         if one.keys not in self.scans:
@@ -186,9 +193,10 @@ class Search:
             return [c for c in claims if own | {c.hypothesis.key} not in self.lost]
 
         while True:
-            others = scan.quiet, scan.quiet_events, scan.inside
-            further = (claim for other in others for claim in hopeful(left(other), RIVALS))
-            pool = [*hopeful(left(scan.claims), REFITS), *further]
+            quiet, inside = left(scan.quiet), left(scan.inside)
+            events = hopeful(left(scan.quiet_events), RIVALS, max((c.odds for c in quiet[:1]), default=-inf))
+            pool = [*hopeful(left(scan.claims), REFITS), *hopeful(quiet, RIVALS), *events]
+            pool = [*pool, *hopeful(inside, RIVALS)]
             before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)
             if len(self.lost) == before:
                 return best

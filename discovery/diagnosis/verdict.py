@@ -300,7 +300,7 @@ def _only(
     """
     keys = frozenset(n.hypothesis.key for n in chosen)
     known = found.tried.get(keys)
-    if known is not None and known.fit.ended_early and matters == inf:
+    if known is not None and known.fit.ended_early and found.best.evidence - known.evidence < matters:
         found.finish(known)
     elif known is None:
         goal = found.goal(answer.noise, matters)
