@@ -91,12 +91,20 @@ def with_intervals(problem: Problem, theta: Array, errors: Array) -> Model:
 
 
 def spread_elsewhere(values: list[float]) -> float:
-    """Standard deviation of the value of one more recording about the mean of `values` (K,). Of a single one,
-    its own size is all that is known.
+    """Standard deviation of the value of one more recording about the mean of `values` (K,): that of a normal
+    distribution whose 95 % interval is Student's, for few values say little of how far they spread.
+
+        t(0.975; K - 1)/1.96 s sqrt(1 + 1/K)
+
+    Of a single one, its own size is all that is known.
     """
-    if len(values) == 1:
+    from scipy.special import stdtrit
+
+    count = len(values)
+    if count == 1:
         return abs(values[0])
-    return float(np.std(values, ddof=1) * np.sqrt(1 + 1 / len(values)))
+    student = stdtrit(count - 1, 0.975) / Z95
+    return float(student * np.std(values, ddof=1) * np.sqrt(1 + 1 / count))
 
 
 def _with_spreads(problem: Problem) -> dict[str, State]:

@@ -198,12 +198,18 @@ def test_a_zero_that_is_a_parameter_of_each_recording_is_found_by_the_first_read
     assert float(np.mean(left[-50:])) == pytest.approx(0.0, abs=0.05 * float(np.ptp(list(ZEROS.values()))))
 
 
-def test_the_spread_of_a_parameter_is_that_of_one_more_value_about_their_mean() -> None:
-    """Against draws: the mean square of a fifth value about the mean of four is var(1 + 1/4)."""
-    draws = np.random.default_rng(5).normal(3.0, 2.0, (20_000, 5))
-    true = np.sqrt(np.mean((draws[:, 4] - draws[:, :4].mean(axis=1)) ** 2))
-    found = np.sqrt(np.mean([spread_elsewhere(row[:4].tolist()) ** 2 for row in draws[:2000]]))
-    assert found == pytest.approx(true, rel=0.05)
+@pytest.mark.parametrize("count", [2, 3, 4, 10])
+def test_one_more_value_lies_within_the_spread_of_the_others_about_their_mean(count: int) -> None:
+    """Against draws: 95 % of them do. The standard deviation of two values alone held 71 %: a machine without
+    a fault was `unexplained` for a zero that lay further off than two others lie apart.
+    """
+    draws = np.random.default_rng(5).normal(3.0, 2.0, (4000, count + 1))
+    away = np.abs(draws[:, -1] - draws[:, :-1].mean(axis=1))
+    inside = away < 1.96 * np.array([spread_elsewhere(row[:-1].tolist()) for row in draws])
+    assert inside.mean() == pytest.approx(0.95, abs=0.015)
+
+
+def test_of_one_value_its_size_is_all_that_is_known() -> None:
     assert spread_elsewhere([-7.0]) == 7.0
 
 
