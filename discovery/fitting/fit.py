@@ -233,7 +233,10 @@ def fit_model(
         better = fit_model(model, campaign, recordings, outputs, guess=other, **further, **limits)
         if _unlikely(better.problem, better.cost, better.noise) < _unlikely(problem, solution.cost, current):
             return replace(better, seconds=clock.perf_counter() - began)
-    excess = _excess(problem, solution) if noise is None and loss == "linear" else 1.0
+    excess = 1.0
+    if noise is None and loss == "linear":  # else the noise model says how alike readings are
+        left = [problem.residual(t) / current.white for t in solution.trajectories]
+        excess = _excess(problem, solution) * max(readings_as_one(left) / together, 1.0)
     covariance, lost = _covariance(problem, solution, together, excess)
     fit = Fit(
         problem,
@@ -268,12 +271,11 @@ def _covariance(
     """Covariance (U, U) of the unknowns, and a sentence for each reason why parameters are not determined.
 
     Args:
-        together: how many times the priors of nuisances were counted; here they count once.
+        together: readings that counted as one: priors of nuisances were counted as often; here they count
+            once.
         excess: factor on the variance of the readings.
     """
-    covariance, lost = covariance_of(problem, solution.gram, solution.theta)
-    times = np.sqrt([together if u.is_nuisance else 1.0 for u in problem.unknowns])
-    return covariance * excess * np.outer(times, times), lost
+    return covariance_of(problem, solution.gram / (excess * together), solution.theta)
 
 
 def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
