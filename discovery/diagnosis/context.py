@@ -105,7 +105,9 @@ class Context:
         """
         if not are_others(self.baseline.trajectories, fit.trajectories):
             return self.form, self.kinds
-        form, kinds = model_form(fit, np.array(self.white.white), self.thermometers, ambient_of(self.campaign))
+        form, kinds = model_form(
+            fit, np.array(self.white.white), self.thermometers, ambient_of(self.campaign)
+        )
         return tuple(form), kinds
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:

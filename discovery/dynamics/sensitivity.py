@@ -12,7 +12,7 @@ from discovery.dynamics import kernel
 from discovery.dynamics.grid import interleaved
 from discovery.dynamics.prediction import output_matrix, outputs
 from discovery.dynamics.starts import balanced, memories, rates_at_start, settled, starts_follow
-from discovery.dynamics.system import shifted
+from discovery.dynamics.system import System, shifted
 from discovery.dynamics.trajectory import Trajectory
 from discovery.terms import Name, evaluate, names
 from discovery.terms.dual import Value
@@ -72,7 +72,7 @@ def sensitivities(
     for k, piece in enumerate(pieces):
         size[k] = piece.series
     nodes = system.grid.looked_at
-    begin = _start_slopes(trajectory, parameters, starts, first + owners)
+    begin = _start_slopes(trajectory, parameters, starts, _at_first(system, candidates, first, owners))
     if grown is not None:
         begin[:, : len(parameters)] *= grown[0]
     dy = kernel.columns(
@@ -146,12 +146,27 @@ def moved_terms(trajectory: Trajectory, parameters: Sequence[str]) -> list[Colum
     ]
 
 
+def _at_first(system: System, candidates: Sequence[Column], first: int, owners: int) -> Array:
+    """Rates (n, M) by which candidates move the states at the first instant, behind `first` other columns."""
+    place = {name: i for i, name in enumerate(system.states)}
+    found = np.zeros((len(place), first + owners))
+    for c in candidates:
+        for name, sign in ((c.into, 1.0), (c.source, -1.0)):
+            if name is not None:
+                found[place[name], first + c.owner] += (
+                    sign * system.scale[place[name]] * float(np.ravel(c.series)[0])
+                )
+    return found
+
+
 def _start_slopes(
-    trajectory: Trajectory, parameters: Sequence[str], starts: Sequence[str], total: int
+    trajectory: Trajectory, parameters: Sequence[str], starts: Sequence[str], forced: Array
 ) -> Array:
-    """Slopes of the start values, (n, M)."""
+    """Slopes of the start values, (n, M). `forced` (n, M): rates that candidates add at the first instant,
+    where states that nothing reads are in balance.
+    """
     system, wanted = trajectory.system, frozenset(parameters)
-    start = np.zeros((len(system.states), total))
+    start = np.zeros(forced.shape)
     # one that also moves freely does so around what its formula says
     for state, dual in system.starts({**system.grid.first, **trajectory.values}, wanted).items():
         for name, slope in dual.partials.items():
@@ -166,7 +181,7 @@ def _start_slopes(
     def settle(some: Sequence[int]) -> None:
         mine = slopes[[free.index(i) for i in some]]
         others = [i for i in range(len(system.states)) if i not in some]
-        moved = mine[:, others] @ start[others]
+        moved = mine[:, others] @ start[others] + forced[list(some)]
         for name in inner:
             moved[:, parameters.index(name)] += mine[:, wrt.index(name)]
         start[some] = settled(mine[:, list(some)], moved)

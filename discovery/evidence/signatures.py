@@ -60,7 +60,21 @@ class Claims:
         out = sensitivities(trajectory, (), (), entering, count=self.count)
         for mine, y, series in showing:
             out[:, y, mine] += series
+        for mine, y, shift in self._zeros(trajectory, showing):
+            begun = sensitivities(trajectory, (trajectory.system.grid.outputs[y],))[:, :, 0]
+            begun[:, y] -= 1.0
+            out[:, :, mine] += shift * begun
         return out
+
+    def _zeros(
+        self, trajectory: Trajectory, showing: Sequence[tuple[int, int, Array]]
+    ) -> list[tuple[int, int, float]]:
+        """Amplitude, output, and by how much its first reading is off: a body that starts at what was read
+        starts by as much lower.
+        """
+        grid = trajectory.system.grid
+        off = {(mine, grid.outputs.index(y)) for h, mine, y in self.shown if h.shifts_the_zero}
+        return [(mine, y, float(s[0])) for mine, y, s in showing if (mine, y) in off and len(s) and s[0]]
 
     def along(self, trajectory: Trajectory) -> tuple[list[Column], list[tuple[int, int, Array]]]:
         """What enters states along a trajectory, and amplitude, output and series (R,) of what is shown."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.diagnosis.context import Context, with_noise_of
+from discovery.diagnosis.context import Context
 from discovery.fitting import Fit
 from tests.diagnosis.parts import dry, wetted
 from tests.machine import BODIES, NOISE, SEEN, SIZES
@@ -47,14 +47,14 @@ def test_form_errors_are_those_where_the_fit_is(factor: float, least: float, mos
     of them shows is then no form error, and a path of its own from the drive to E_Y stood for it.
     """
     fit = moved(wetted().fit, "G_mt", factor)
-    context = with_noise_of(dry(), fit)
-    assert (context.formed is fit) == (factor > 4)  # the parts of time constants that form errors know
-    laws, places, *_ = context.kinds
-    early = [np.zeros(f.shape[:2]) for f in context.form]
+    context = dry()
+    form, (laws, places, *_) = context.form_of(fit)
+    assert (form is context.form) == (factor < 4)  # the parts of time constants that form errors know
+    early = [np.zeros(f.shape[:2]) for f in form]
     for k, column in enumerate(early):
         column[:, list(SEEN).index("E_Y")] = seen_early(context, k)
     wanted = np.concatenate([c.ravel() for c in early]) / NOISE
-    forms = np.concatenate([f[:, :, laws : laws + places].reshape(-1, places) for f in context.form]) / NOISE
+    forms = np.concatenate([f[:, :, laws : laws + places].reshape(-1, places) for f in form]) / NOISE
     # form errors of places with a spread of a tenth, next to what is read
     e = np.linalg.solve(forms.T @ forms + np.eye(places) / 0.1**2, forms.T @ wanted)
     left = np.sum((wanted - forms @ e) ** 2) + np.sum(e**2) / 0.1**2

@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from discovery.dynamics import make_grid, make_system, predict, simulate
+from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import Effect, catalogue
 from discovery.effects.hypothesis import Hypothesis
+from discovery.effects.scene import Scene
 from discovery.evidence.signatures import signatures
+from discovery.models import Model, State
+from discovery.recordings import Campaign, Channel, Recording
+from discovery.terms import Term, parse
 from tests import machine
 from tests.effects.sample import expand, inside, machine_for, sample, trajectory
 
@@ -66,3 +71,51 @@ def test_what_belongs_to_another_recording_is_zero() -> None:
     assert {h.recording for h in found} == {"two"}
     assert not signatures(trajectory(sample()[0], "one"), found).any()
     assert signatures(trajectory(sample()[0], "two"), found).any()
+
+
+@pytest.mark.parametrize(
+    ("word", "where"), [("sensor_offset_recording", ("T",)), ("input_heat", ("inside",))]
+)
+def test_a_warm_start_moves_with_an_effect(word: str, where: tuple[str, ...]) -> None:
+    """A recording that begins while the machine is warm: a plate begins at its first reading, less what its
+    thermometer is off, and what is inside it begins in balance with it and with what heats it.
+    """
+    time = np.arange(0.0, 4000.0, 50.0)
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "load": Channel("load", "other input", "N", None, "held"),
+        "T_env": Channel("T_env", "ambient temperature", "degC", None, "linear"),
+        "T": Channel("T", "temperature", "degC", 0.1, "linear"),
+    }
+    values = {
+        "P": np.where(time < 2000, 80.0, 0.0),
+        "load": np.where(time < 1000, 300.0, 100.0),
+        "T_env": np.full(len(time), 20.0),
+        "T": np.full(len(time), 33.0),
+    }
+    campaign = Campaign("plate", channels, {n: Recording(n, time, values) for n in ("one", "two")})
+    terms = (
+        Term("drive", "plate", parse("0.5*P")),
+        Term("loss", "plate", parse("4*(T_env - plate)")),
+        Term("joint", "inside", parse("3*(plate - inside)"), "plate"),
+        Term("air inside", "inside", parse("0.5*(T_env - inside)")),
+    )
+    states = {
+        "plate": State("plate", "degC", 3000.0, scale=1 / 3000),
+        "inside": State("inside", "degC", 6000.0, scale=1 / 6000),
+    }
+    plain = Model("plate", {}, states, terms, {"T": parse("plate")})
+    after = {"one": ("one", "two"), "two": ("two",)}
+    largest = {"P": 80.0, "load": 300.0, "T_env": 20.0}
+    seen = Scene(channels, ("T",), ("one", "two"), after, largest, frozenset(["load"]), 0.02, 0.02)
+    found = candidates(plain, [catalogue()[word]], seen)
+    h = next(h for h in found if h.places == where and h.recording in (None, "two"))
+    grid = make_grid(campaign, "two", ["P", "load", "T_env"], ("T",))
+
+    def run(size: float) -> machine.Array:
+        model = h.added_to(plain, {h.amplitudes[0]: size})
+        return predict(simulate(make_system(model, grid), model.values("two")))
+
+    column = signatures(simulate(make_system(plain, grid), plain.values()), [h])[:, :, 0]
+    expected = (run(1e-3) - run(-1e-3)) / 2e-3
+    assert np.abs(column - expected).max() < 1e-3 * np.abs(expected).max()
