@@ -100,8 +100,8 @@ class Context:
         return candidates(self.model, self.effects, self.scene)
 
     def form_of(self, fit: Fit) -> tuple[tuple[Array, ...], Kinds]:
-        """Form errors of a fitted model, and of what kinds: those of the baseline, or its own where its bodies
-        are others. A share of flows that a model does not have excuses nothing.
+        """Form errors of a fitted model, and of what kinds: those of the baseline, or its own where its
+        bodies are others. A share of flows that a model does not have excuses nothing.
         """
         if not are_others(self.baseline.trajectories, fit.trajectories):
             return self.form, self.kinds
