@@ -7,7 +7,7 @@ of the diagnosis. Single wrong readings are set aside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
 from discovery.dynamics import Trajectory, predict, sensitivities
+from discovery.dynamics.sensitivity import late_columns
 from discovery.errors import RunsAwayError
 from discovery.evidence.noisy import with_noise
 from discovery.evidence.outliers import find_outliers, without
@@ -33,17 +34,20 @@ BLOCKS = 8  # of a recording, resampled: what a free run misses lasts for hours
 
 @dataclass(frozen=True)
 class Known:
-    """Parameters that all recordings share, `names` (P,), and their `covariance` (P, P)."""
+    """Parameters that all recordings share, `names` (P,), and their `covariance` (P, P); `late`: by how many
+    seconds inputs are logged late, rms over the recordings.
+    """
 
     names: tuple[str, ...]
     covariance: Array
+    late: Mapping[str, float] = field(default_factory=dict)
 
     def beside(self, sensors: Sequence[str], sd: float) -> Known:
         """The same and the zeros of some sensors, each off by `sd`."""
         count = len(self.names)
         covariance = sd**2 * np.eye(count + len(sensors))
         covariance[:count, :count] = self.covariance
-        return Known((*self.names, *sensors), covariance)
+        return replace(self, names=(*self.names, *sensors), covariance=covariance)
 
 
 @dataclass(frozen=True)
@@ -177,11 +181,12 @@ def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
 
 
 def _unsure(trajectory: Trajectory, size: Array, known: Known, only: Sequence[int]) -> float:
-    """rms of the readings of some outputs of a free run from the uncertainty of parameters, in units of a
-    size (Y,).
+    """rms of the readings of some outputs of a free run from the uncertainty of parameters, and from inputs
+    that are logged late, in units of a size (Y,).
     """
     moved = sensitivities(trajectory, known.names) / size[None, :, None]
     variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
+    variance += np.sum((late_columns(trajectory, known.late) / size[None, :, None]) ** 2, axis=2)
     mine = list(only)
     return float(np.sqrt(np.mean(variance[:, mine][trajectory.system.grid.measured[:, mine]])))
 

@@ -209,7 +209,16 @@ class Scored:
         unknowns = [self.fit.problem.unknowns[i] for i in self.seen.moving]
         shared = [k for k, u in enumerate(unknowns) if not u.is_nuisance and u.recording is None]
         _, _, covariance = self._forms(self.best)[0].solved()
-        return Known(tuple(unknowns[k].name for k in shared), covariance[np.ix_(shared, shared)])
+        late: dict[str, list[float]] = {}
+        for k, u in enumerate(unknowns):
+            if u.is_late:
+                square = float(self.fit.theta[self.seen.moving[k]] ** 2 + covariance[k, k])
+                late.setdefault(u.name, []).append(square)
+        return Known(
+            tuple(unknowns[k].name for k in shared),
+            covariance[np.ix_(shared, shared)],
+            {name: float(np.sqrt(np.mean(squares))) for name, squares in late.items()},
+        )
 
     def rms(self, apart: Collection[str] = ()) -> float:
         """Root mean square of the residuals over their reading noise, without some recordings."""
