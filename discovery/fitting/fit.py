@@ -186,10 +186,10 @@ def fit_model(
     if not guess and begin is None:
         theta, runs = gains_first(problem, theta, noise or first_noise(problem, runs, stated, least), runs)
     current = noise or first_noise(problem, runs, stated, least)
-    nuisance = any(u.is_nuisance for u in problem.unknowns)
+    weighed = any(u.prior or u.is_nuisance for u in problem.unknowns)  # against the readings
     problem = problem.spread(current, first_spreads(problem, runs))
     together = 1.0
-    rounds = _ROUNDS if noise is None or nuisance else 1
+    rounds = _ROUNDS if noise is None or weighed else 1
     unknown = noise is None and any(stated[name] is None for name in problem.outputs)
     settled = False
     solution: Solution | None = None
@@ -212,7 +212,7 @@ def fit_model(
             change = max(abs(np.log(a / b)) for a, b in zip(updated.white, current.white, strict=True))
             settled, current = change < 0.02, updated
             unknown = unknown and not settled
-        if nuisance:
+        if weighed:
             alone = [innovations(t, current, r) for t, r in zip(solution.trajectories, left, strict=True)]
             before, together = together, readings_as_one(alone)
             settled = settled and abs(np.log(together / before)) < 0.1
@@ -271,8 +271,7 @@ def _covariance(
     """Covariance (U, U) of the unknowns, and a sentence for each reason why parameters are not determined.
 
     Args:
-        together: readings that counted as one: priors of nuisances were counted as often; here they count
-            once.
+        together: readings that counted as one: priors were counted as often; here they count once.
         excess: factor on the variance of the readings.
     """
     return covariance_of(problem, solution.gram / (excess * together), solution.theta)

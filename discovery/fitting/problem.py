@@ -139,15 +139,15 @@ class Problem:
 
         Args:
             together: readings that count as one (`readings_as_one`). A thousand of them in a row that are
-                off by what the model lacks must not outvote what is known of a start or an input: the prior
-                of each counts as often.
+                off by what the model lacks must not outvote what is known of a start, an input, or the shape
+                of a law: each prior counts as often.
         """
         rows: list[float] = []
         slopes: list[tuple[int, float]] = []
         for i, u in enumerate(self.unknowns):
             if u.prior:
                 mean, sd = u.prior
-                sd /= np.sqrt(together) if u.is_nuisance else 1.0
+                sd /= np.sqrt(together)
                 value = np.log(theta[i]) if u.is_log else theta[i]
                 rows.append((value - mean) / sd)
                 slopes.append((i, 1.0 / (sd * theta[i]) if u.is_log else 1.0 / sd))
