@@ -186,7 +186,7 @@ def fit_model(
     if not guess and begin is None:
         theta, runs = gains_first(problem, theta, noise or first_noise(problem, runs, stated, least), runs)
     current = noise or first_noise(problem, runs, stated, least)
-    weighed = any(u.prior or u.is_nuisance for u in problem.unknowns)  # against the readings
+    weighed = any((u.prior and not u.is_penalty) or u.is_nuisance for u in problem.unknowns)
     problem = problem.spread(current, first_spreads(problem, runs))
     together = 1.0
     rounds = _ROUNDS if noise is None or weighed else 1

@@ -68,6 +68,7 @@ class Unknown:
     spread: Spread = "given"  # how the prior of a start is known
     is_offset: bool = False  # `name` is the channel
     is_late: bool = False  # likewise
+    is_penalty: bool = False  # the prior is that of the model, and counts once however alike readings are
 
     @property
     def key(self) -> tuple[str, str | None, bool, bool, bool]:
@@ -140,14 +141,14 @@ class Problem:
         Args:
             together: readings that count as one (`readings_as_one`). A thousand of them in a row that are
                 off by what the model lacks must not outvote what is known of a start, an input, or the shape
-                of a law: each prior counts as often.
+                of a law: each prior counts as often, but for penalties.
         """
         rows: list[float] = []
         slopes: list[tuple[int, float]] = []
         for i, u in enumerate(self.unknowns):
             if u.prior:
                 mean, sd = u.prior
-                sd /= np.sqrt(together)
+                sd /= 1.0 if u.is_penalty else np.sqrt(together)
                 value = np.log(theta[i]) if u.is_log else theta[i]
                 rows.append((value - mean) / sd)
                 slopes.append((i, 1.0 / (sd * theta[i]) if u.is_log else 1.0 / sd))
@@ -293,7 +294,8 @@ def _parameter(
         known = start, UNREAD
     reach = FARTHEST * abs(start) or np.inf
     low, high = max(low, -reach), min(p.max, reach)
-    return Unknown(name, recording, False, start, low, high, known, is_log, belief)
+    penalty = prior is None and p.prior is not None
+    return Unknown(name, recording, False, start, low, high, known, is_log, belief, is_penalty=penalty)
 
 
 def _zero_spread(is_output: bool) -> list[Spread]:

@@ -21,7 +21,7 @@ class Parameter:
     `value` is the start value before a fit and the estimate after it, `low` and `high` its 95 % interval.
     With `per_recording` every recording has its own, kept in `values`, with its interval in `intervals`;
     `spread` is the standard deviation about `value` in a recording that no fit has seen.
-    `prior` is what is known of it before a fit: mean and standard deviation.
+    `prior` penalises a fit: mean and standard deviation.
     """
 
     value: float
