@@ -100,15 +100,16 @@ class Diagnosis:
     def interval(self, h: Hypothesis, name: str) -> tuple[float | None, float | None]:
         """95 % interval of a parameter of a named effect.
 
-        It covers the interval under the noise of the diagnosis, and that next to effects which are not sure;
-        that of the fitted repaired model where there is no other. Each is wider than in its fit, because the
-        form of the law may be slightly wrong.
+        It covers the interval under the noise of the diagnosis, and that next to effects which are not sure,
+        around their values and around that of the repaired model: they may differ. Each is wider than in its
+        fit, because the form of the law may be slightly wrong.
         """
         assert self.after is not None
         p = self.after.model.parameters[name]
         wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
         own = [s for one in self._centred if (s := one.interval(name)) and None not in s]
-        known = own or [(p.low, p.high)]
+        around = [(p.value - (high - low) / 2, p.value + (high - low) / 2) for low, high in own]
+        known = [*own, *around] or [(p.low, p.high)]
         # one that lies on one side of the value does not widen the other
         lows = [p.value - np.hypot(max(p.value - s[0], 0.0), wider) for s in known if s[0] is not None]
         highs = [p.value + np.hypot(max(s[1] - p.value, 0.0), wider) for s in known if s[1] is not None]
@@ -217,7 +218,7 @@ def diagnose(
     def proved(only: Sequence[int]) -> tuple[Improvement, dict[str, Improvement], dict[str, Improvement]]:
         """Free runs of some outputs: on all fitted recordings, on each held-out one, and on each of all."""
         shown = [outputs[y] for y in only]
-        runs = free_runs(campaign, fit, before, after or before, noise, only=only)
+        runs = free_runs(campaign, fit, before, after or before, noise, known.fitted(), only)
         runs |= free_runs(campaign, read, before, after or before, noise, known, only)
         each = {r: improvement([one], shown) for r, one in runs.items()}
         fitting = improvement([runs[r] for r in fit if r in runs], shown)

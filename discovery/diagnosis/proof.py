@@ -42,6 +42,10 @@ class Known:
     covariance: Array
     late: Mapping[str, float] = field(default_factory=dict)
 
+    def fitted(self) -> Known:
+        """What is left open of a recording of the fit: free runs take stamps as they are."""
+        return replace(self, names=(), covariance=np.zeros((0, 0)))
+
     def beside(self, sensors: Sequence[str], sd: float) -> Known:
         """The same and the zeros of some sensors, each off by `sd`."""
         count = len(self.names)
@@ -139,7 +143,7 @@ def free_runs(
     """Free runs on each recording; a recording on which the baseline diverges is left out.
 
     Args:
-        known: how well the parameters are known, for recordings that no fit has seen.
+        known: what is left open of the parameters, and of when inputs were logged.
         only: outputs that are compared; default all.
     """
     mine = list(range(len(noise.outputs)) if only is None else only)
