@@ -21,7 +21,7 @@ from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import FAR, IN_PLAY, Posterior, posterior
 from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
-from discovery.diagnosis.repair import with_repair
+from discovery.diagnosis.repair import repaired, with_repair
 from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scan import in_play
 from discovery.diagnosis.scored import Scored, is_usual, with_unknown
@@ -107,9 +107,10 @@ class Diagnosis:
         assert self.after is not None
         p = self.after.model.parameters[name]
         wider = thresholds.FORM * abs(p.value) if h.effect.is_physics and name in h.amplitudes else 0.0
-        own = [s for one in self._centred if (s := one.interval(name)) and None not in s]
-        around = [(p.value - (high - low) / 2, p.value + (high - low) / 2) for low, high in own]
-        known = [*own, *around] or [(p.low, p.high)]
+        own = [ends for one in self._centred if (ends := one.interval(name))]
+        halves = [(high - low) / 2 for low, high in own]
+        around = [(p.value - half, p.value + half) for half in halves]
+        known: list[tuple[float | None, float | None]] = [*own, *around] or [(p.low, p.high)]
         # one that lies on one side of the value does not widen the other
         lows = [p.value - np.hypot(max(p.value - s[0], 0.0), wider) for s in known if s[0] is not None]
         highs = [p.value + np.hypot(max(s[1] - p.value, 0.0), wider) for s in known if s[1] is not None]
@@ -228,7 +229,19 @@ def diagnose(
     fitting, proof, each = proved(every)
     fitted_to, unseen, all_runs = (fitting, proof, each) if judged == every else proved(judged)
     unit = unit_of(campaign, outputs)
-    verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit), unseen)
+
+    def whole() -> Improvement | None:
+        """How well the repaired model with every effect of the answer follows the fitted recordings."""
+        every = verdict.answer.hypotheses
+        fit_of_all = (
+            repaired(context, verdict.answer, every, model, seen) if len(every) > len(named) else None
+        )
+        if fit_of_all is None:
+            return None
+        runs = free_runs(campaign, fit, before, fit_of_all, noise, known.fitted(), judged)
+        return improvement([runs[r] for r in fit if r in runs], [outputs[y] for y in judged])
+
+    verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit, whole), unseen)
     if not verdict.named and after is not None:
         after = None
     in_fit = [h for h in hung if h.recording in fit]

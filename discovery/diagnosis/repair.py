@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.named import Named
 from discovery.diagnosis.refit import shape_priors, with_effects
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.selection import Search
 from discovery.diagnosis.verdict import Verdict
 from discovery.diagnosis.withdrawal import beyond_range, runs_away
+from discovery.effects.hypothesis import Hypothesis
 from discovery.errors import RunsAwayError
 from discovery.fitting import Fit, Prior, fit_model
 from discovery.fitting.covariance import Z95
@@ -29,7 +29,8 @@ def with_repair(
         if keys in found.tried and found.tried[keys].fit.ended_early:
             found.finish(found.tried[keys])
         alone = found.tried.get(keys, verdict.answer)
-        after = _repaired(context, alone, verdict.named, model, seen)
+        jumps = [n.hypothesis for n in verdict.named if n.is_abrupt]
+        after = repaired(context, alone, [n.hypothesis for n in verdict.named], model, seen, jumps)
         sure = runs_away(verdict) if after is None else beyond_range(verdict, after)
         if sure is verdict:
             return verdict, alone, after
@@ -37,8 +38,13 @@ def with_repair(
     return verdict, verdict.answer, None
 
 
-def _repaired(
-    context: Context, answer: Scored, names: Sequence[Named], model: Model, seen: Campaign
+def repaired(
+    context: Context,
+    answer: Scored,
+    chosen: Sequence[Hypothesis],
+    model: Model,
+    seen: Campaign,
+    jumps: Sequence[Hypothesis] = (),
 ) -> Fit | None:
     """The model with effects of an answer, fitted in the same way as the baseline of the proof; None if it
     does not stay finite from the starts of free runs.
@@ -46,12 +52,11 @@ def _repaired(
     A jump that no flow makes keeps the size that the readings next to it show: a model that is far from the
     machine would make up for its own error with it.
     """
-    chosen = [n.hypothesis for n in names]
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
     priors = shape_priors(chosen)  # readings may leave the shape of an effect open
-    for name in (name for n in names if n.is_abrupt for name in n.hypothesis.amplitudes):
+    for name in (name for h in jumps for name in h.amplitudes):
         if (ends := answer.interval(name)) is not None:
             priors[name] = Prior(values[name].value, (ends[1] - ends[0]) / (2 * Z95))
     try:

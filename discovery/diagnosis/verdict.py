@@ -338,5 +338,5 @@ def coarse(found: Search) -> tuple[str, ...]:
         return ()
     return (
         f"the flows of the model are wrong by about {100 * found.baseline.off:.0f} %, more than is usual for "
-        "a lumped model, and no effect explains it",
+        "a lumped model, and no effect that is sure explains it",
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from math import expm1, inf, isfinite, log
 
@@ -133,14 +133,22 @@ def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
     )
 
 
-def unfinished(verdict: Verdict, fitting: Improvement, unit: str) -> Verdict:
+def unfinished(
+    verdict: Verdict, fitting: Improvement, unit: str, whole: Callable[[], Improvement | None] = lambda: None
+) -> Verdict:
     """The verdict where the model misses the recordings that it was fitted to by more than noise makes
     likely: something acts beside what is named, or where nothing is. Where it is more than the names
     explain, they are withdrawn: they may stand for it. So are events and faults, which can only be recognised
     with a model that is nearly right, but for jumps that no flow makes.
+
+    Args:
+        whole: `fitting` of the repaired model with the effects that are not sure, too: what they explain is
+            no sign of anything else. None where there are none.
     """
     rms = fitting.judged[1 if verdict.named else 0]
     if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
+        return verdict
+    if verdict.named and (other := whole()) is not None and not _misses(other, other.judged[1], power=2):
         return verdict
     still = "still " if verdict.named else ""
     missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms, unit)}"

@@ -137,7 +137,7 @@ def late_columns(trajectory: Trajectory, late: Mapping[str, float]) -> Array:
     unsure = replace(grid, unsure=there, late={name: grid.late.get(name, 0.0) for name in there})
     run = replace(trajectory, system=replace(trajectory.system, grid=unsure))
     columns = sensitivities(run, (), (), moved_in_time(run, list(there)), len(there))
-    return columns * np.array(list(there.values()))
+    return np.asarray(columns * np.array(list(there.values())))
 
 
 def _in_terms(trajectory: Trajectory, parameters: Sequence[str]) -> frozenset[str]:

@@ -124,7 +124,7 @@ def parse_unit(unit: str) -> "pint.Unit":
 
     Raises ValueError: pint does not know it, or it might never end.
     """
-    unit = re.sub(r"\bmils?\b", "thou", unit)
+    unit = re.sub(r"(?<=[a-zA-Z])(?=[2-4](?!\w))", "**", re.sub(r"\bmils?\b", "thou", unit))  # W/m2
     if not unit or len(unit) > _LONGEST or not _SPELLING.fullmatch(unit):
         raise ValueError(unit)
     try:

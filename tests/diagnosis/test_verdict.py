@@ -621,7 +621,7 @@ def test_a_name_does_not_owe_its_evidence_to_what_lost_its_own(monkeypatch: pyte
     for alone, named in ((10.0, []), (50.0, [OFFSET])):
         found = said(pair(OFFSET, FRICTION, 150.0, alone, 50.0), words)
         assert [n.hypothesis for n in found.named] == named
-        why = "depends on effects that are not sure enough to be named"
+        why = "account for too much of its log evidence"
         assert any(why in text for text in found.reasons) != bool(named)
 
 

@@ -54,7 +54,8 @@ def test_intervals_hold_the_truth_where_residuals_are_correlated() -> None:
         found = fit_model(PLATE, warmed(seed), ["a"], ["T"]).model.parameters
         for name, true in (("G", LOSS), ("k", GAIN)):
             low, high = found[name].low, found[name].high
-            assert low is not None and high is not None
+            assert low is not None
+            assert high is not None
             inside.append(low <= true <= high)
     assert np.mean(inside) > 0.85
 

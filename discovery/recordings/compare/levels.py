@@ -75,12 +75,23 @@ def _scale(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
             before, after = (max(noise_of(part), rounding) for part in (read[:row], read[row:]))
             if min(before, after) > least and abs(np.log(after / before)) > abs(np.log(best)):
                 best, where = after / before, int(row)
-        if max(best, 1 / best) > _RESCALED:
+        if max(best, 1 / best) > _RESCALED and _is_lasting(read, where, rounding):
             change = f"{best:.2g} times as" if best > 1 else f"1/{1 / best:.2g} as"
             at = (time[where] - time[0]) / 3600
             what = f"'{channel.name}' is {change} noisy from about {at:.2g} h on"
             do = "another unit or range from there on: split the recording, or mend it"
             yield warning(one, channel, where, what, do, "halfway", 6.0)
+
+
+def _is_lasting(read: Array, where: int, rounding: float) -> bool:
+    """Whether every stretch is noisier on one side of a row than every stretch on the other: what is quiet
+    each night has the same unit. The stretches next to the row count only if there are no others.
+    """
+    size = max(_FEWEST, read.size // _PLACES)
+    before, after = (np.array_split(some, max(1, some.size // size)) for some in (read[:where], read[where:]))
+    first = [max(noise_of(part), rounding) for part in before[:-1] or before]
+    then = [max(noise_of(part), rounding) for part in after[1:] or after]
+    return max(first) < min(then) or max(then) < min(first)
 
 
 def _resolution(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
