@@ -193,10 +193,14 @@ class Search:
             return [c for c in claims if own | {c.hypothesis.key} not in self.lost]
 
         while True:
-            quiet, inside = left(scan.quiet), left(scan.inside)
-            events = hopeful(left(scan.quiet_events), RIVALS, max((c.odds for c in quiet[:1]), default=-inf))
-            pool = [*hopeful(left(scan.claims), REFITS), *hopeful(quiet, RIVALS), *events]
-            pool = [*pool, *hopeful(inside, RIVALS)]
+            quiet = left(scan.quiet)
+            reached = quiet[0].odds if quiet else -inf
+            pool = [
+                *hopeful(left(scan.claims), REFITS),
+                *hopeful(quiet, RIVALS),
+                *hopeful(left(scan.quiet_events), RIVALS, reached),
+                *hopeful(left(scan.inside), RIVALS),
+            ]
             before, best = len(self.lost), self._refitted(current, current.hypotheses, pool)
             if len(self.lost) == before:
                 return best

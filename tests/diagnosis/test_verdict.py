@@ -275,8 +275,8 @@ def test_evidence_that_needs_an_effect_without_a_name_is_said() -> None:
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.3})
     assert found.named == ()
     assert (
-        f"fluid_convection at {FLUID.where} is not named: its log evidence of 90 (probability 0.95) depends "
-        "on effects that are not sure enough to be named "
+        f"fluid_convection at {FLUID.where} is not named: effects that are not sure enough to be named, or "
+        "others in its place, account for too much of its log evidence of 90 (probability 0.95) "
         f"(alone it has 5 less than friction_speed at {FRICTION.where})"
     ) in found.reasons
     said_of = f"friction_speed at {FRICTION.where} is possible but not sure enough to be named"
