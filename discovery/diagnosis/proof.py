@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
-from discovery.dynamics import Trajectory, predict, sensitivities
-from discovery.dynamics.sensitivity import late_columns
+from discovery.dynamics import Trajectory, predict, sensitivities, simulate
+from discovery.dynamics.system import shifted
 from discovery.errors import RunsAwayError
 from discovery.evidence.noisy import with_noise
 from discovery.evidence.outliers import find_outliers, without
@@ -190,7 +190,8 @@ def _unsure(trajectory: Trajectory, size: Array, known: Known, only: Sequence[in
     """
     moved = sensitivities(trajectory, known.names) / size[None, :, None]
     variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
-    variance += np.sum((late_columns(trajectory, known.late) / size[None, :, None]) ** 2, axis=2)
+    for name, seconds in known.late.items():
+        variance += (moved_by(trajectory, name, seconds) / size) ** 2
     mine = list(only)
     return float(np.sqrt(np.mean(variance[:, mine][trajectory.system.grid.measured[:, mine]])))
 
@@ -252,6 +253,14 @@ def explained(found: Mapping[str, Improvement]) -> float | None:
             gap += before**2 - i.floor**2
             gain += before**2 - max(after, i.floor) ** 2
     return float(np.clip(gain / gap, -1.0, 1.0)) if gap > 0 else None
+
+
+def moved_by(trajectory: Trajectory, name: str, seconds: float) -> Array:
+    """What the outputs show more (R, Y) where an input is logged so many seconds late."""
+    grid = trajectory.system.grid
+    late = {**grid.late, name: grid.late.get(name, 0.0) + seconds}
+    there = shifted(trajectory.system, grid.offset, late)
+    return predict(simulate(there, trajectory.values, trajectory.x[0])) - predict(trajectory)
 
 
 def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:

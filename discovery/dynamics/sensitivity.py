@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -128,16 +128,6 @@ def moved_in_time(trajectory: Trajectory, late: Sequence[str]) -> list[Column]:
                 change = np.asarray((above - below) / (2 * width))
                 found.append(Column(owner, term.into, change, term.source))
     return found
-
-
-def late_columns(trajectory: Trajectory, late: Mapping[str, float]) -> Array:
-    """What the outputs show more (R, Y, L) where inputs are logged late by so many seconds."""
-    grid = trajectory.system.grid
-    there = {name: seconds for name, seconds in late.items() if name in grid.samples}
-    unsure = replace(grid, unsure=there, late={name: grid.late.get(name, 0.0) for name in there})
-    run = replace(trajectory, system=replace(trajectory.system, grid=unsure))
-    columns = sensitivities(run, (), (), moved_in_time(run, list(there)), len(there))
-    return np.asarray(columns * np.array(list(there.values())))
 
 
 def _in_terms(trajectory: Trajectory, parameters: Sequence[str]) -> frozenset[str]:

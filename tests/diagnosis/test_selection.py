@@ -207,3 +207,23 @@ def test_a_model_without_an_effect_is_fitted_from_where_the_other_stands(
     assert without is not None
     assert without.evidence == kept
     assert goals == [7.0 - MOVED]  # it ends where it does not come below what is known
+
+
+def test_a_fit_that_ended_early_is_finished_where_it_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A motor of two masses: 13.8 units for the second one, as the fit without it promised 80 that it did not
+    have; a name needs 16. What is far below need not be exact.
+    """
+
+    def model(evidence: float, *words: str, early: bool = False) -> Scored:
+        chosen = tuple(SimpleNamespace(key=word) for word in words)
+        stub = {"hypotheses": chosen, "keys": frozenset(words), "noise": None, "evidence": evidence}
+        return cast(Scored, SimpleNamespace(**stub, fit=SimpleNamespace(ended_early=early)))
+
+    near, far = model(-13.8, early=True), model(-90.0, "heat", early=True)
+    search = Search(cast(Any, None))
+    for one in (model(0.0, "mass"), near, far):
+        search.tried[one.keys] = one
+    monkeypatch.setattr(selection, "score", lambda _, chosen, *__: model(-21.6, *(h.key for h in chosen)))
+    search.finish_near(25.0)
+    assert search.gain == 21.6
+    assert search.tried[far.keys] is far

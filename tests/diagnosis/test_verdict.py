@@ -887,6 +887,15 @@ def test_a_fault_beside_what_a_model_still_misses_has_no_name() -> None:
     assert unfinished(said(WET, {"fluid_convection": 0.9}), run, "K").named
 
 
+def test_what_unsure_effects_explain_is_no_sign_of_anything_else() -> None:
+    """Two heaters: lags and a path leave 0.65 K where noise is 0.45 K, with a little radiation 0.5 K."""
+    fault = said(Tried([Model((OFFSET,), 50.0), Model((), 0.0)]), {"sensor_offset": 0.98})
+    run, close, far = (Improvement(1.09, new, 0.45, 0.0, 0.0, {}) for new in (0.65, 0.5, 0.64))
+    assert unfinished(fault, run, "K", lambda: close) is fault
+    assert unfinished(fault, run, "K", lambda: far).named == ()
+    assert unfinished(fault, run, "K", lambda: None).named == ()
+
+
 def test_a_model_that_misses_its_own_recordings_does_not_lack_nothing() -> None:
     """A cooler whose fan the model leaves out: 5.2 K where noise is 1.4, and no effect was sure. A repair
     whose names were withdrawn does not count.

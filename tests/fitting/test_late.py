@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from discovery.diagnosis.proof import moved_by
 from discovery.dynamics import Grid, Trajectory, make_grid, predict
-from discovery.fitting import Noise, fit_model, make_problem
+from discovery.fitting import Noise, fit_model, make_problem, predict_recording
 from discovery.fitting.impulses import inputs_in_gaps, late_switches, moved_in_gaps
 from discovery.fitting.kalman import make_filter
 from discovery.models import Model, Parameter, State
@@ -176,3 +177,14 @@ def test_what_an_input_was_before_the_recording_is_not_known(late: float) -> Non
     larger = predict(run(f"g*(delay(load, {late}) + more)")) - predict(arriving)
     assert moved[:, :, 0] == pytest.approx(larger, abs=1e-9)
     assert not len(moved_in_gaps(run("g*load"))[0])
+
+
+def test_a_proof_knows_what_late_inputs_make_of_a_free_run() -> None:
+    """Against the exact body of a load that switches half a minute before its stamp."""
+    seen = campaign(logged(3, 0.0))
+    truth = model().with_values(TRUTH)
+    run = predict_recording(truth, seen, "r3", ["T"], [0.2])
+    expected = logged(3, 30.0).values["T"] - logged(3, 0.0).values["T"]  # of the same noise
+    moved = moved_by(run, "load", 30.0)[:, 0]
+    assert np.abs(expected).max() > 1.0
+    assert np.abs(moved - expected).max() < 0.06 * np.abs(expected).max()  # its mean over a step
