@@ -5,7 +5,7 @@ for.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import log
 
 import numpy as np
@@ -65,6 +65,7 @@ class Settings:
     floor: Mapping[str, float]
     axes: tuple[Weighted, ...]
     coarser: tuple[str, ...] = ()
+    known: dict[Place, Setting] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def usual(self) -> Setting:
@@ -76,6 +77,11 @@ class Settings:
 
     def at(self, place: Place) -> Setting:
         """The setting at a place."""
+        if place not in self.known:
+            self.known[place] = self._made(place)
+        return self.known[place]
+
+    def _made(self, place: Place) -> Setting:
         (jitter,), (rough,), (slow,), (level,), (share,), (form, edge), (part,), *steps = (
             axis[k][0] for axis, k in zip(self.axes, place, strict=True)
         )
@@ -142,8 +148,10 @@ def settings(
     maybe = ((JITTER, unsure), (1.0, noisy))
     chances = [dict.fromkeys([0.0, size] if there else [0.0], 1.0) for size, there in maybe]
     single = [*chances, prior.slow, prior.levels, prior.shares]
-    # a body is coarser by a step as often as a model is, and it may be any body
-    steps = tuple(((float(k),), w / (len(floor) if k else 1)) for k, w in enumerate(prior.shares.values()))
+    # a body is coarser by a step as often as a model is coarser than usual, and it may be any body
+    usual = max(prior.shares, key=lambda share: prior.shares[share])
+    weights = [w for share, w in prior.shares.items() if share >= usual]
+    steps = tuple(((float(k),), w / (len(floor) if k else 1)) for k, w in enumerate(weights))
     axes = [
         *(tuple(((value,), weight) for value, weight in table.items()) for table in single),
         tuple(prior.forms.items()),
