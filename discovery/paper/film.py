@@ -130,7 +130,7 @@ def nozzle(m: Material) -> Chapter | None:
             shows.append(f"{recording}: the fit failed: {error}")
             continue
         for name, what in (("b", "nozzle height"), ("m", "fluid velocity V_j")):
-            p = widened(fit.model.parameters[name], fit.together)
+            p = fit.model.parameters[name]
             word = "identified" if identified(p) else "not identified"
             rows.append((recording, what, p.value, p.low, p.high, word))
             shows.append(
@@ -155,19 +155,6 @@ def nozzle(m: Material) -> Chapter | None:
             "whatever h is.",
         ),
     )
-
-
-def widened(p: Parameter, together: float) -> Parameter:
-    """A parameter with its interval for readings of which `together` count as one (`Fit.together`).
-
-    >>> p = widened(Parameter(0.5, low=0.4, high=0.6), 4.0)
-    >>> round(p.low, 3), round(p.high, 3)
-    (0.3, 0.7)
-    """
-    if p.low is None or p.high is None:
-        return p
-    far = max(together, 1.0) ** 0.5
-    return replace(p, low=p.value - far * (p.value - p.low), high=p.value + far * (p.high - p.value))
 
 
 def identified(p: Parameter) -> bool:
