@@ -10,7 +10,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from discovery.diagnosis.context import Context, make_context
+from discovery.diagnosis.context import Context, Form, make_context
 from discovery.diagnosis.proof import explained, free_runs, improvement
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scored import Scored, scored
@@ -65,8 +65,9 @@ class Problem:
         stated = {name: context.campaign.channels[name].noise for name in context.outputs}
         residuals = [fit.problem.residual(t) for t in fit.trajectories]
         noise = white_noise(context.outputs, stated, residuals)
-        exact = tuple(columns[:, :, :0] for columns in context.form)  # laws of the right form
-        return replace(context, settings=only(noise), form=exact, kinds=(0, 0, 0, 0))
+        none = tuple(columns[:, :, :0] for columns in context.form.columns)
+        exact = Form(none, (0, 0, 0, 0))  # laws of the right form
+        return replace(context, settings=only(noise), form=exact, own_form=exact)
 
     def improvement(self, repaired: Fit | None, chosen: Sequence[Hypothesis]) -> Answer:
         """`improvement` of diagnosis.json for a repaired model with `chosen` in it; nothing without one.

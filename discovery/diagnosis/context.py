@@ -31,7 +31,6 @@ from discovery.models import Model
 from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
-Kinds = tuple[int, int, int, int]  # form errors of laws, places, zeros of thermometers, air at bodies
 
 MOST_READINGS = 4000  # instants, over all recordings
 NODES = 1000  # of a recording, about, and its readings: inputs are their means in between
@@ -51,6 +50,22 @@ def process_prior() -> Prior:
 
 
 @dataclass(frozen=True)
+class Form:
+    """Form errors of a fitted model: by recording what the readings show more (R, Y, M) for a share of one,
+    and how many of these are of laws, places, zeros of thermometers, and air at bodies.
+    """
+
+    columns: tuple[Array, ...]
+    kinds: tuple[int, int, int, int]
+
+    @classmethod
+    def of(cls, fit: Fit, white: Noise, thermometers: Sequence[str], air: Sequence[str]) -> Form:
+        """Those where a fit is; `white`: the reading noise, in which directions are compared."""
+        columns, kinds = model_form(fit, np.array(white.white), thermometers, air)
+        return cls(tuple(columns), kinds)
+
+
+@dataclass(frozen=True)
 class Context:
     """Everything that stays the same while hypotheses are tried."""
 
@@ -66,8 +81,9 @@ class Context:
     floor: Mapping[str, float]  # of the process noise of each state at level one
     belief: float  # log of the factor within which its start values are known
     outliers: tuple[Outlier, ...]  # set aside
-    form: tuple[Array, ...]  # by recording (R, Y, M): form errors of the baseline, for a share of one
-    kinds: Kinds
+    form: Form  # of models with effects: of the baseline, later of the answer
+    formed: Fit  # where it was found
+    own_form: Form  # of the baseline
     thermometers: tuple[str, ...]  # that the model uses or shows
     sizes: Sizes  # prior of amplitudes, along the baseline; the same under every reading noise
 
@@ -99,16 +115,11 @@ class Context:
         """Every effect at every place of the model where it can act."""
         return candidates(self.model, self.effects, self.scene)
 
-    def form_of(self, fit: Fit) -> tuple[tuple[Array, ...], Kinds]:
-        """Form errors of a fitted model, and of what kinds: those of the baseline, or its own where its
-        bodies are others. A share of flows that a model does not have excuses nothing.
+    def form_of(self, chosen: Sequence[Hypothesis]) -> Form:
+        """Form errors of a model with some effects. A share of flows that the baseline does not have excuses
+        nothing: a motor without its heat has hardly any.
         """
-        if not are_others(self.baseline.trajectories, fit.trajectories):
-            return self.form, self.kinds
-        form, kinds = model_form(
-            fit, np.array(self.white.white), self.thermometers, ambient_of(self.campaign)
-        )
-        return tuple(form), kinds
+        return self.form if chosen else self.own_form
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
         """Prior of the size of each amplitude."""
@@ -161,7 +172,7 @@ def make_context(
         both = [(fitted(one, fit), one) for one in (grids, smoothed(grids))]
         fit, grids = max(both, key=lambda one: log_likelihood(one[0], plain))
     thermometers = _thermometers(fit, campaign)
-    form, kinds = model_form(fit, np.array(white.white), thermometers, ambient)
+    form = Form.of(fit, white, thermometers, ambient)
     spreads = fit.problem.start_spreads()
     own = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
     scene = replace(make_scene(campaign, model, recordings, outputs, after), spacing=_spacing(grids))
@@ -180,8 +191,9 @@ def make_context(
         floor,
         belief,
         tuple(outliers),
-        tuple(form),
-        kinds,
+        form,
+        fit,
+        form,
         thermometers,
         Sizes(model, fit.trajectories, noises.white),
     )
@@ -198,10 +210,17 @@ def _thermometers(fit: Fit, campaign: Campaign) -> tuple[str, ...]:
 
 
 def with_noise_of(context: Context, fit: Fit) -> Context:
-    """The context with the reading noise of a better fit, if the campaign states none."""
+    """The context with the reading noise of a better fit, if the campaign states none, and with the form
+    errors of its bodies, where they are others: a fit without an effect may link two bodies a thousand times
+    as well as they are.
+    """
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
-    return replace(context, settings=_settings(white, context.floor, context.grids, context.settings.coarser))
+    noises = _settings(white, context.floor, context.grids, context.settings.coarser)
+    if not are_others(context.formed.trajectories, fit.trajectories):
+        return replace(context, settings=noises)
+    form = Form.of(fit, white, context.thermometers, ambient_of(context.campaign))
+    return replace(context, settings=noises, form=form, formed=fit)
 
 
 def with_coarser(context: Context, states: tuple[str, ...]) -> Context:

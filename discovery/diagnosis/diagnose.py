@@ -290,14 +290,15 @@ def _with_coarse_bodies(found: Search) -> Search:
 
 
 def _under_own_noise(found: Search, tell: Callable[[str], None]) -> Search:
-    """The search under the reading noise that the best model leaves, and with bodies that it leaves coarse,
-    where they are others.
+    """The search under the reading noise that the best model leaves, with the form errors of its bodies, and
+    with those that it leaves coarse, where they are others.
     """
     found = _with_coarse_bodies(found)
     before = found.context
     other = with_noise_of(before, found.best.fit)
     change = np.log(np.array(other.white.white) / np.array(before.white.white))
-    if not found.best.hypotheses or np.max(np.abs(change)) <= ANOTHER_NOISE:
+    is_other = other.form is not before.form or np.max(np.abs(change)) > ANOTHER_NOISE
+    if not found.best.hypotheses or not is_other:
         return found
     tell("repeating with the noise of the answer")
     return found.under(other)

@@ -232,11 +232,11 @@ class Scored:
 def whitened(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Whitened:
     """A fit with a set of effects, with the form errors of the model and of the effects."""
     own = effect_form(fit.trajectories, chosen)
-    form, kinds = context.form_of(fit)
-    extra = tuple(np.concatenate(parts, axis=2) for parts in zip(form, own, strict=True))
+    form = context.form_of(chosen)
+    extra = tuple(np.concatenate(parts, axis=2) for parts in zip(form.columns, own, strict=True))
     spreads = 1.0, 1.0, thresholds.AIR, thresholds.LAYERS, thresholds.FORM
-    spread = np.repeat(spreads, [*kinds, own[0].shape[2]])
-    return Whitened(fit, context.blocks, extra, spread, kinds)
+    spread = np.repeat(spreads, [*form.kinds, own[0].shape[2]])
+    return Whitened(fit, context.blocks, extra, spread, form.kinds)
 
 
 def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from discovery.diagnosis.context import Context
+from discovery.diagnosis.context import Context, with_noise_of
 from discovery.fitting import Fit
 from tests.diagnosis.parts import dry, wetted
 from tests.machine import BODIES, NOISE, SEEN, SIZES
@@ -47,9 +47,11 @@ def test_form_errors_are_those_where_the_fit_is(factor: float, least: float, mos
     of them shows is then no form error, and a path of its own from the drive to E_Y stood for it.
     """
     fit = moved(wetted().fit, "G_mt", factor)
-    context = dry()
-    form, (laws, places, *_) = context.form_of(fit)
-    assert (form is context.form) == (factor < 4)  # the parts of time constants that form errors know
+    context = with_noise_of(dry(), fit)
+    assert (context.formed is fit) == (factor > 4)  # the parts of time constants that form errors know
+    assert context.form_of([]) is dry().form  # the model as it is has a share of its own flows
+    laws, places, *_ = context.form.kinds
+    form = context.form.columns
     early = [np.zeros(f.shape[:2]) for f in form]
     for k, column in enumerate(early):
         column[:, list(SEEN).index("E_Y")] = seen_early(context, k)
