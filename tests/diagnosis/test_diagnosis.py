@@ -135,6 +135,7 @@ def test_a_size_lies_within_the_intervals_of_both_fits() -> None:
     )
     other = replace(found, verdict=replace(found.verdict, answer=below)).interval(h, size)  # type: ignore[arg-type]
     assert other[0] == max(-3.0 * high, p.min)
+    assert other[1] is not None
     assert high <= other[1] < 2.0 * high  # its width, and not as far above as it lies below
 
 
