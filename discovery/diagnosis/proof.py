@@ -7,6 +7,7 @@ of the diagnosis. Single wrong readings are set aside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import copysign, hypot, inf, isfinite, sqrt
 
@@ -191,7 +192,8 @@ def _unsure(trajectory: Trajectory, size: Array, known: Known, only: Sequence[in
     moved = sensitivities(trajectory, known.names) / size[None, :, None]
     variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
     for name, seconds in known.late.items():
-        variance += (moved_by(trajectory, name, seconds) / size) ** 2
+        with suppress(RunsAwayError):
+            variance += (moved_by(trajectory, name, seconds) / size) ** 2
     mine = list(only)
     return float(np.sqrt(np.mean(variance[:, mine][trajectory.system.grid.measured[:, mine]])))
 

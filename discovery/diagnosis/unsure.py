@@ -53,8 +53,8 @@ def _unsure(n: Named, added: float, least: float, alone: str) -> str:
     chance = f"probability {_chance(n.probability)}"
     if added >= least and n.together >= thresholds.NAMED:
         return (
-            f"{name} is not named: effects that are not sure enough to be named, or others in its place, "
-            f"account for too much of its log evidence of {added:.0f} ({chance}){alone}"
+            f"{name} is not named: too much of its log evidence of {added:.0f} ({chance}) may be due to "
+            f"effects that are not sure enough to be named{alone}"
         )
     # a high probability next to too little evidence reads like a contradiction: only what is short is said
     short = []

@@ -65,7 +65,7 @@ def _degrees(low: float, high: float) -> dict[str, Range]:
 
 _DEVIATION = {"um": Range((-2000.0, 2000.0)), "um/m": Range((-2000.0, 2000.0))}
 FLOWS = ("l/min", "kg/min")  # volume or mass, about the same number for water
-_MOVED = Range((0.0, 1e3), (0.0, 1e6))
+_FLOW = Range((0.0, 1e3), (0.0, 1e6))
 _POWER = {"W": Range((-50e3, 200e3)), "percent": Range((-100.0, 100.0))}
 
 ROLES: dict[str, RoleFacts] = {
@@ -74,7 +74,7 @@ ROLES: dict[str, RoleFacts] = {
     "coolant temperature": _temperature(-30.0, 90.0),
     "temperature": _temperature(-50.0, 300.0, measured=True),
     "fluid flow": RoleFacts(
-        ("1", *FLOWS), ranges={"1": Range((0.0, 1.0), (0.0, 1e6)), **dict.fromkeys(FLOWS, _MOVED)}
+        ("1", *FLOWS), ranges={"1": Range((0.0, 1.0), (0.0, 1e6)), **dict.fromkeys(FLOWS, _FLOW)}
     ),
     "rotation speed": RoleFacts(("rpm",), ranges={"rpm": Range((-30e3, 30e3), (-1e6, 1e6))}),
     "heat load": RoleFacts(("W",), ranges=_POWER, plain=True),

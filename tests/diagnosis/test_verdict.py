@@ -275,8 +275,8 @@ def test_evidence_that_needs_an_effect_without_a_name_is_said() -> None:
     found = said(both, {"fluid_convection": 0.95, "friction_speed": 0.3})
     assert found.named == ()
     assert (
-        f"fluid_convection at {FLUID.where} is not named: effects that are not sure enough to be named, or "
-        "others in its place, account for too much of its log evidence of 90 (probability 0.95) "
+        f"fluid_convection at {FLUID.where} is not named: too much of its log evidence of 90 "
+        "(probability 0.95) may be due to effects that are not sure enough to be named "
         f"(alone it has 5 less than friction_speed at {FRICTION.where})"
     ) in found.reasons
     said_of = f"friction_speed at {FRICTION.where} is possible but not sure enough to be named"
@@ -621,7 +621,7 @@ def test_a_name_does_not_owe_its_evidence_to_what_lost_its_own(monkeypatch: pyte
     for alone, named in ((10.0, []), (50.0, [OFFSET])):
         found = said(pair(OFFSET, FRICTION, 150.0, alone, 50.0), words)
         assert [n.hypothesis for n in found.named] == named
-        why = "account for too much of its log evidence"
+        why = "may be due to effects that are not sure enough to be named"
         assert any(why in text for text in found.reasons) != bool(named)
 
 
