@@ -47,7 +47,7 @@ def scan_model(context: Context, current: Scored) -> Scan:
     settings = in_play(context, current)
     events = [h for h in offered if h.effect.search in ("window", "step")]
     slabs = [context.slab([h]) for h in events]
-    placed = place_events(current.seen, settings[0], events, slabs)
+    placed, *quiet = place_events(current.seen, settings, events, slabs)
     there = [_at_instants(h, o) for o in current.hypotheses if o.spans for h in events if _alike(h, o)]
     moved = [one for h in there for one in with_shapes(h)]
     lasting = [one for h in offered if h.effect.search == "shapes" for one in with_shapes(h)]
@@ -60,18 +60,9 @@ def scan_model(context: Context, current: Scored) -> Scan:
         tuple(found.claims),
         {h.key: tuple(claims) for h, claims in by_effect},
         tuple(found.quiet) if len(settings) > 1 else (),
-        tuple(_quiet_events(context, current, settings[-1], events)) if len(settings) > 1 else (),
+        tuple(scan(current.seen, settings[-1:], quiet[0], context.slab(quiet[0])).claims) if quiet else (),
         tuple(scan(within, settings[-1:], every, context.slab(every)).claims) if within else (),
     )
-
-
-def _quiet_events(
-    context: Context, current: Scored, setting: Setting, events: Sequence[Hypothesis]
-) -> list[Score]:
-    """Events at the instants that are most likely under a noise, scored under it."""
-    slabs = [context.slab([h]) for h in events]
-    placed = place_events(current.seen, setting, events, slabs)
-    return scan(current.seen, [setting], placed, context.slab(placed)).claims
 
 
 def inside(context: Context, current: Scored) -> Whitened | None:

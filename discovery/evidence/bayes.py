@@ -132,10 +132,11 @@ def project(seen: Whitened, setting: Setting, columns: Sequence[Array]) -> Proje
     return projected(seen.whiten(setting.noise, columns)[0], seen.absorbed(setting.noise))
 
 
-def project_one(seen: Whitened, setting: Setting, recording: int, columns: Array) -> Projected:
-    """As `project`, of columns (R, Y, A) that are zero but in one recording."""
-    gone, here = seen.absorbed(setting.noise), seen.places[recording]
-    z = seen.whiten_one(setting.noise, recording, columns)
+def project_one(seen: Whitened, noise: Noise, gone: Absorbed, recording: int, columns: Array) -> Projected:
+    """As `project`, of columns (R, Y, A) that are zero but in one recording, where a refit absorbs what is
+    `gone`.
+    """
+    here, z = seen.places[recording], seen.whiten_one(noise, recording, columns)
     return projected(z, replace(gone, residual=gone.residual[here], basis=gone.basis[here]))
 
 

@@ -20,7 +20,8 @@ from discovery.evidence.bayes import ROUNDING, Projected, Slab, project_one
 from discovery.evidence.outliers import MOST
 from discovery.evidence.settings import Setting
 from discovery.evidence.signatures import Claims, signatures
-from discovery.evidence.whitening import Whitened, log_sum_exp
+from discovery.evidence.whitening import Absorbed, Whitened, log_sum_exp
+from discovery.fitting import Noise
 from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
@@ -33,38 +34,44 @@ CLOSER = 6  # claims that get one
 
 
 def place_events(
-    seen: Whitened, setting: Setting, claims: Sequence[Hypothesis], slabs: Sequence[Slab]
-) -> list[Hypothesis]:
-    """Claims with the instants that the readings make most likely.
+    seen: Whitened, settings: Sequence[Setting], claims: Sequence[Hypothesis], slabs: Sequence[Slab]
+) -> list[list[Hypothesis]]:
+    """Under each of some noises: the claims with the instants that the readings make most likely.
 
     Args:
-        setting: noise under which they are sought.
         claims: events (`search` "window" or "step"), each of one recording.
         slabs: prior of the amplitudes of each claim.
     """
-    seen.absorbed(setting.noise)  # once, before recordings are searched side by side
+    noises = [(setting.noise, seen.absorbed(setting.noise)) for setting in settings]
 
-    def of_recording(run: str) -> list[tuple[float, Hypothesis, Slab]]:
-        search = _Search(seen, setting, run)
-        its = [(h, slab) for h, slab in zip(claims, slabs, strict=True) if h.recording == run]
-        tried = [(search.rough(h, slab), h, slab) for h, slab in its]
-        return [(found[0] + h.log_odds, found[1], slab) for found, h, slab in tried if found]
+    def of_recording(run: str) -> list[list[tuple[float, Hypothesis, Slab]]]:
+        searches = [_Search(seen, noise, gone, run) for noise, gone in noises]
+        found: list[list[tuple[float, Hypothesis, Slab]]] = [[] for _ in noises]
+        for h, slab in zip(claims, slabs, strict=True):
+            look = searches[0].first_look(h) if h.recording == run else None
+            for search, mine in zip(searches, found, strict=True):
+                if look is not None and (one := search.rough(h, slab, *look)):
+                    mine.append((one[0] + h.log_odds, one[1], slab))
+        return found
 
-    def closer(one: tuple[float, Hypothesis, Slab]) -> Hypothesis:
-        _, h, slab = one
-        return _Search(seen, setting, str(h.recording)).close(h, slab)
+    def closer(one: tuple[int, Hypothesis, Slab]) -> Hypothesis:
+        k, h, slab = one
+        return _Search(seen, *noises[k], str(h.recording)).close(h, slab)
 
-    runs = list(dict.fromkeys(str(h.recording) for h in claims))
-    rough = [one for each in side_by_side(of_recording, runs) for one in each]
-    rough.sort(key=lambda one: -one[0])
-    return [*side_by_side(closer, rough[:CLOSER]), *(h for _, h, _ in rough[CLOSER:])]
+    by_run = side_by_side(of_recording, list(dict.fromkeys(str(h.recording) for h in claims)))
+    rough = [[one for each in by_run for one in each[k]] for k in range(len(noises))]
+    for mine in rough:
+        mine.sort(key=lambda one: -one[0])
+    best = [(k, h, slab) for k, mine in enumerate(rough) for _, h, slab in mine[:CLOSER]]
+    closest = iter(side_by_side(closer, best))
+    return [[*(next(closest) for _ in mine[:CLOSER]), *(h for _, h, _ in mine[CLOSER:])] for mine in rough]
 
 
 class _Search:
-    """Instants of one recording under one noise."""
+    """Instants of one recording under one noise, of which a refit absorbs what is `gone`."""
 
-    def __init__(self, seen: Whitened, setting: Setting, run: str) -> None:
-        self.seen, self.setting = seen, setting
+    def __init__(self, seen: Whitened, noise: Noise, gone: Absorbed, run: str) -> None:
+        self.seen, self.noise, self.gone = seen, noise, gone
         self.index = [t.system.grid.recording for t in seen.fit.trajectories].index(run)
         self.trajectory = seen.fit.trajectories[self.index]
         grid = self.trajectory.system.grid
@@ -73,15 +80,31 @@ class _Search:
 
     def projected(self, columns: Array) -> Projected:
         """Columns (R, Y, M) of the recording, seen through what a refit absorbs."""
-        return project_one(self.seen, self.setting, self.index, columns)
+        return project_one(self.seen, self.noise, self.gone, self.index, columns)
 
-    def rough(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
-        """The claim at the best of evenly spread instants, or of all readings for a jump, with what share of
-        them the readings leave, and its log Bayes factor; None where the recording is too short.
+    def first_look(self, h: Hypothesis) -> tuple[Array, Array] | None:
+        """Evenly spread instants (M,) and what the claim shows from each on (R, Y, M), under any noise; for a
+        jump all readings, whose columns are simple. None where the recording is too short.
+        """
+        instants, none = self._coarse(), np.zeros((0, 0, 0))
+        if h.effect.search == "window":
+            return instants, event_steps(self.trajectory, h, instants)
+        if not h.terms:
+            instants = self.read[LEAST : len(self.read) - LEAST]
+            return (instants, none) if len(instants) else None
+        sooner = np.searchsorted(self.read, instants)
+        instants = instants[_enough(sooner, len(self.read) - sooner)]
+        return (instants, self._beginning(h, instants)) if len(instants) else None
+
+    def rough(
+        self, h: Hypothesis, slab: Slab, instants: Array, columns: Array
+    ) -> tuple[float, Hypothesis] | None:
+        """The claim at the best instants of a first look, with what share of all the readings leave, and its
+        log Bayes factor; None where no window is possible.
         """
         if h.effect.search == "window":
-            return self._rough_window(h, slab)
-        return self._pulse(h, slab) if h.terms else self._step(h, slab)
+            return self._rough_window(h, slab, instants, columns)
+        return self._pulse(h, slab, instants, columns) if h.terms else self._step(h, slab, instants)
 
     def close(self, h: Hypothesis, slab: Slab) -> Hypothesis:
         """The candidate at the best instants near its present ones."""
@@ -89,10 +112,11 @@ class _Search:
             return self._close_window(h, slab)
         return self._close_pulse(h, slab) if h.terms else h
 
-    def _rough_window(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+    def _rough_window(
+        self, h: Hypothesis, slab: Slab, coarse: Array, columns: Array
+    ) -> tuple[float, Hypothesis] | None:
         """An effect between two instants; it may begin before the recording and end after it."""
-        coarse = self._coarse()
-        gains = self._allowed(self._windows(h, coarse, slab), coarse)
+        gains = self._allowed(self._windows(columns, slab), coarse)
         possible = int(np.isfinite(gains).sum())
         if not possible:
             return None
@@ -107,7 +131,8 @@ class _Search:
         begin, end = h.instants
 
         def gains(instants: Array) -> Array:
-            return self._allowed(self._windows(h, instants, slab), instants)
+            columns = event_steps(self.trajectory, h, instants)
+            return self._allowed(self._windows(columns, slab), instants)
 
         near = _around(h.shapes[begin], h.shapes[end], width, coarse[0], coarse[-1])
         found = gains(near)
@@ -133,9 +158,9 @@ class _Search:
         gains[~_enough(inside, first, last)] = -np.inf
         return gains
 
-    def _windows(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
-        """Log Bayes factor of an effect between each two instants."""
-        part, count = self.projected(event_steps(self.trajectory, h, instants)), len(instants)
+    def _windows(self, columns: Array, slab: Slab) -> Array:
+        """Log Bayes factor of an effect between each two instants, from what it shows from each on."""
+        part, count = self.projected(columns), columns.shape[2]
         matrix = part.block(range(count))
         diagonal = np.diag(matrix)
         # between two instants nothing may act, and the difference of two responses is rounding
@@ -148,51 +173,54 @@ class _Search:
         out[upper] = _log_bayes(dot[upper], gram[upper], flat)
         return out
 
-    def _pulse(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+    def _pulse(
+        self, h: Hypothesis, slab: Slab, instants: Array, columns: Array
+    ) -> tuple[float, Hypothesis] | None:
         """What begins to act in the machine at an instant, and is seen from there on."""
-        coarse = self._coarse()
-        sooner = np.searchsorted(self.read, coarse)
-        instants = coarse[_enough(sooner, len(self.read) - sooner)]
-        if not len(instants):
-            return None
-        gains = self._of_instants(h, instants, slab)
+        gains = self._of_instants(columns, slab)
         weight = float(log_sum_exp(gains) - np.max(gains)) - float(np.log(len(gains)))
         best = {h.instants[0]: float(instants[int(np.argmax(gains))])}
         return float(np.max(gains)) + weight, h.at(best, weight)
 
     def _close_pulse(self, h: Hypothesis, slab: Slab) -> Hypothesis:
-        """At each of the shape values that a search integrates over: what comes at once and what comes slowly
-        begin at other instants.
+        """At the shape values that a search integrates over, closer and closer: what comes at once and what
+        comes slowly begin at other instants. The better half of them has a closer look each time.
         """
-        return max((self._closest(one, slab) for one in with_shapes(h)), key=lambda found: found[0])[1]
-
-    def _closest(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis]:
-        """The hypothesis at the best instant near its present one, with its log Bayes factor."""
-        coarse, (name,) = self._coarse(), h.instants
-        width, best = float(coarse[1] - coarse[0]), h.shapes[name]
+        coarse, least = self._coarse(), float(np.min(self.trajectory.system.grid.step))
+        width, left = float(coarse[1] - coarse[0]), with_shapes(h)
         while True:
-            near = np.clip(best + np.linspace(-width, width, 2 * FINE + 1), coarse[0], coarse[-1])
-            gains = self._of_instants(h, near, slab)
-            best, width = float(near[np.argmax(gains)]), width / FINE
-            if width <= float(np.min(self.trajectory.system.grid.step)):
-                break
-        found = replace(h.at({name: best}, h.log_weight), spans={name: _span(gains, near)})
+            looks = [self._closest(one, slab, width, coarse) for one in left]
+            looks.sort(key=lambda found: -found[0])
+            width /= FINE
+            if width <= least:
+                return looks[0][1]
+            left = [found for _, found in looks[: (len(looks) + 1) // 2]]
+
+    def _closest(self, h: Hypothesis, slab: Slab, width: float, coarse: Array) -> tuple[float, Hypothesis]:
+        """The hypothesis at the best instant within a width of its present one, with its log Bayes factor."""
+        (name,) = h.instants
+        steps = np.linspace(-width, width, 2 * FINE + 1)
+        near = np.clip(h.shapes[name] + steps, coarse[0], coarse[-1])
+        gains = self._of_instants(self._beginning(h, near), slab)
+        best = {name: float(near[np.argmax(gains)])}
+        found = replace(h.at(best, h.log_weight), spans={name: _span(gains, near)})
         return float(np.max(gains)) + h.log_weight, found
 
-    def _of_instants(self, h: Hypothesis, instants: Array, slab: Slab) -> Array:
-        """Log Bayes factor of an effect that begins at each of some instants."""
+    def _beginning(self, h: Hypothesis, instants: Array) -> Array:
+        """What an effect shows (R, Y, M) that begins at each of some instants."""
         (name,) = h.instants
-        part = self.projected(signatures(self.trajectory, [h.at({name: float(t)}) for t in instants]))
-        flat = Slab(*(np.broadcast_to(v[:1], len(instants)) for v in (slab.median, slab.factor, slab.sign)))
+        return signatures(self.trajectory, [h.at({name: float(t)}) for t in instants])
+
+    def _of_instants(self, columns: Array, slab: Slab) -> Array:
+        """Log Bayes factor of an effect at each instant, from what it shows."""
+        part, count = self.projected(columns), columns.shape[2]
+        flat = Slab(*(np.broadcast_to(v[:1], count) for v in (slab.median, slab.factor, slab.sign)))
         return _log_bayes(part.dot, np.maximum(part.gram, 1e-30), flat)
 
-    def _step(self, h: Hypothesis, slab: Slab) -> tuple[float, Hypothesis] | None:
+    def _step(self, h: Hypothesis, slab: Slab, instants: Array) -> tuple[float, Hypothesis] | None:
         """A jump of one output, or of all, at an instant. Every reading is tried: a filter that follows the
         machine sees a jump in one or two readings only, and knows nothing of it some readings away.
         """
-        instants = self.read[LEAST : len(self.read) - LEAST]
-        if not len(instants):
-            return None
         (name,) = h.instants
         gains = np.zeros(len(instants))
         for k, output in enumerate(h.shown):

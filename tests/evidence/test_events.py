@@ -85,7 +85,7 @@ def test_columns_of_one_recording_are_projected_as_those_of_all() -> None:
     seen = seen_of(machine.simulated(1), machine.simulated(2))
     columns = np.random.default_rng(0).standard_normal((*seen.residuals[1].shape, 4))
     whole = project(seen, SETTING, [np.zeros((*seen.residuals[0].shape, 4)), columns])
-    alone = project_one(seen, SETTING, 1, columns)
+    alone = project_one(seen, SETTING.noise, seen.absorbed(SETTING.noise), 1, columns)
     np.testing.assert_allclose(alone.dot, whole.dot, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(alone.block(range(4)), whole.block(range(4)), rtol=1e-9, atol=1e-9)
 
@@ -93,7 +93,7 @@ def test_columns_of_one_recording_are_projected_as_those_of_all() -> None:
 def test_heat_of_some_hours_is_found_where_and_when_it_acted() -> None:
     seen = seen_of(machine.simulated(1), machine.simulated(2, concealed=sun))
     claims = machine.claims(machine.model(), "unmeasured_heat")
-    placed = place_events(seen, SETTING, claims, [SLAB] * len(claims))
+    (placed,) = place_events(seen, [SETTING], claims, [SLAB] * len(claims))
     assert len(placed) == len(claims)
     count = sum(len(h.amplitudes) for h in placed)
     scores = scan(seen, [SETTING], placed, SLAB.take(np.zeros(count, dtype=np.intp))).claims
@@ -114,7 +114,7 @@ def test_an_event_may_have_shapes_next_to_its_instants() -> None:
     slow = replace(usual, formula=formula, shapes=(Shape("t_build", "s", 3600.0, factor=2.0), *usual.shapes))
     seen = seen_of(machine.simulated(1), machine.simulated(2, concealed=sun))
     claims = candidates(machine.model(), [slow], machine.scene(machine.model()))
-    placed = place_events(seen, SETTING, claims, [SLAB] * len(claims))
+    (placed,) = place_events(seen, [SETTING], claims, [SLAB] * len(claims))
     assert len(placed) == len(claims)
     assert all(h.shapes[h.instants[0]] < h.shapes[h.instants[1]] for h in placed)
 
@@ -124,7 +124,7 @@ def test_a_jump_of_a_sensor_is_found_between_two_readings() -> None:
     jumped = machine.changed(other, E_Z=other.values["E_Z"] + 3.0 * (other.time >= 50000))
     seen = seen_of(machine.simulated(1), jumped)
     claims = machine.claims(machine.model(), "sensor_offset")
-    placed = place_events(seen, SETTING, claims, [Slab(*(np.array([v]) for v in (3.0, 4.0, 0.0)))] * 6)
+    (placed,) = place_events(seen, [SETTING], claims, [Slab(*(np.array([v]) for v in (3.0, 4.0, 0.0)))] * 6)
     slab = Slab(np.full(6, 3.0), np.full(6, 4.0), np.zeros(6))
     scores = scan(seen, [SETTING], placed, slab).claims
     h = scores[0].hypothesis
@@ -161,8 +161,8 @@ def placed(run: Recording, word: str, noise: Noise) -> Hypothesis:
     scene = Scene(channels, ("plate",), ("r",), {"r": ("r",)}, {"P": 150.0}, frozenset(), 0.02, 0.02)
     effects = [e for name, e in catalogue().items() if name == word]
     claims = [h for h in candidates(model, effects, scene) if h.outputs or h.states]
-    (first, *_) = place_events(Whitened(fit, 12), replace(SETTING, noise=noise), claims, [SLAB] * len(claims))
-    return first
+    (found,) = place_events(Whitened(fit, 12), [replace(SETTING, noise=noise)], claims, [SLAB] * len(claims))
+    return found[0]
 
 
 @pytest.mark.parametrize("jump", [864, 1008])
@@ -198,8 +198,7 @@ def test_where_nothing_acts_there_is_no_window(monkeypatch: pytest.MonkeyPatch) 
         block=lambda some: (1e7 + 1e-9 * (rounding + rounding.T))[np.ix_(some, some)],
     )
     seen = seen_of(machine.simulated(1), machine.simulated(2))
-    h = next(c for c in machine.claims(machine.model(), "input_missed") if "P_drive in r1" in c.stated)
-    search = _Search(seen, SETTING, "r1")
+    search = _Search(seen, SETTING.noise, seen.absorbed(SETTING.noise), "r1")
     monkeypatch.setattr(search, "projected", lambda _: part)
-    gains = search._windows(h, np.linspace(40000.0, 50000.0, count), SLAB)
+    gains = search._windows(np.zeros((1, 1, count)), SLAB)
     assert gains[np.triu_indices(count, 1)].max() < 1.0
