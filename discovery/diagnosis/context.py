@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.left_open import Usual
 from discovery.diagnosis.sizes import Sizes
 from discovery.dynamics import Grid, make_grid
 from discovery.effects.candidates import candidates
@@ -120,6 +121,12 @@ class Context:
         nothing: a motor without its heat has hardly any.
         """
         return self.form if chosen else self.own_form
+
+    @property
+    def usually_off(self) -> Usual:
+        """Zeros of thermometers, and the air at bodies, as the search allows for them."""
+        air = tuple(ambient_of(self.campaign))
+        return Usual(self.thermometers, thresholds.AIR, air, thresholds.LAYERS)
 
     def slab(self, hypotheses: Sequence[Hypothesis]) -> Slab:
         """Prior of the size of each amplitude."""

@@ -214,13 +214,14 @@ def diagnose(
     named = [n.hypothesis for n in verdict.named]
     noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
-    known = (alone if after else found.baseline).known().beside(context.thermometers, thresholds.AIR)
+    known = (alone if after else found.baseline).known()
+    of_fit, of_others = known.of_fit(after or before, context.usually_off), known.beside(context.usually_off)
 
     def proved(only: Sequence[int]) -> tuple[Improvement, dict[str, Improvement], dict[str, Improvement]]:
         """Free runs of some outputs: on all fitted recordings, on each held-out one, and on each of all."""
         shown = [outputs[y] for y in only]
-        runs = free_runs(campaign, fit, before, after or before, noise, known.fitted(), only)
-        runs |= free_runs(campaign, read, before, after or before, noise, known, only)
+        runs = free_runs(campaign, fit, before, after or before, noise, of_fit, only)
+        runs |= free_runs(campaign, read, before, after or before, noise, of_others, only)
         each = {r: improvement([one], shown) for r, one in runs.items()}
         fitting = improvement([runs[r] for r in fit if r in runs], shown)
         return fitting, {r: each[r] for r in read if r in each}, each
@@ -238,7 +239,8 @@ def diagnose(
         )
         if fit_of_all is None:
             return None
-        runs = free_runs(campaign, fit, before, fit_of_all, noise, known.fitted(), judged)
+        of_all = known.of_fit(fit_of_all, context.usually_off)
+        runs = free_runs(campaign, fit, before, fit_of_all, noise, of_all, judged)
         return improvement([runs[r] for r in fit if r in runs], [outputs[y] for y in judged])
 
     verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit, whole), unseen)

@@ -7,16 +7,15 @@ of the diagnosis. Single wrong readings are set aside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
-from discovery.dynamics import Trajectory, predict, sensitivities, simulate
-from discovery.dynamics.system import shifted
+from discovery.diagnosis.left_open import Known
+from discovery.dynamics import Trajectory, predict
 from discovery.errors import RunsAwayError
 from discovery.evidence.noisy import with_noise
 from discovery.evidence.outliers import find_outliers, without
@@ -31,28 +30,6 @@ MULTIPLES = "times the reading noise"  # the unit of a proof over outputs of sev
 CLOSABLE = 1.03  # rms over the noise floor from which a recording holds a mismatch worth closing
 DRAWS = 400
 BLOCKS = 8  # of a recording, resampled: what a free run misses lasts for hours
-
-
-@dataclass(frozen=True)
-class Known:
-    """Parameters that all recordings share, `names` (P,), and their `covariance` (P, P); `late`: by how many
-    seconds inputs are logged late, rms over the recordings.
-    """
-
-    names: tuple[str, ...]
-    covariance: Array
-    late: Mapping[str, float] = field(default_factory=dict)
-
-    def fitted(self) -> Known:
-        """What is left open of a recording of the fit: free runs take stamps as they are."""
-        return replace(self, names=(), covariance=np.zeros((0, 0)))
-
-    def beside(self, sensors: Sequence[str], sd: float) -> Known:
-        """The same and the zeros of some sensors, each off by `sd`."""
-        count = len(self.names)
-        covariance = sd**2 * np.eye(count + len(sensors))
-        covariance[:count, :count] = self.covariance
-        return replace(self, names=(*self.names, *sensors), covariance=covariance)
 
 
 @dataclass(frozen=True)
@@ -169,7 +146,7 @@ def free_runs(
             None if then is None else shown(then),
             noise_in_free_runs(last, noise, size, mine),
             size[mine],
-            _unsure(new or old, size, known, mine) if known else 0.0,
+            known.rms(new, size, mine) if known and new else 0.0,
             (shown(_started(before, old, first, white)), None if started is None else shown(started)),
         )
     return found
@@ -183,19 +160,6 @@ def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
     return from_known_starts(
         run, left, np.array(fit.noise.white), known, fit.together, reading, thresholds.MISSED
     )
-
-
-def _unsure(trajectory: Trajectory, size: Array, known: Known, only: Sequence[int]) -> float:
-    """rms of the readings of some outputs of a free run from the uncertainty of parameters, and from inputs
-    that are logged late, in units of a size (Y,).
-    """
-    moved = sensitivities(trajectory, known.names) / size[None, :, None]
-    variance = np.einsum("ryp,pq,ryq->ry", moved, known.covariance, moved, optimize=True)
-    for name, seconds in known.late.items():
-        with suppress(RunsAwayError):
-            variance += (moved_by(trajectory, name, seconds) / size) ** 2
-    mine = list(only)
-    return float(np.sqrt(np.mean(variance[:, mine][trajectory.system.grid.measured[:, mine]])))
 
 
 def improvement(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement:
@@ -255,14 +219,6 @@ def explained(found: Mapping[str, Improvement]) -> float | None:
             gap += before**2 - i.floor**2
             gain += before**2 - max(after, i.floor) ** 2
     return float(np.clip(gain / gap, -1.0, 1.0)) if gap > 0 else None
-
-
-def moved_by(trajectory: Trajectory, name: str, seconds: float) -> Array:
-    """What the outputs show more (R, Y) where an input is logged so many seconds late."""
-    grid = trajectory.system.grid
-    late = {**grid.late, name: grid.late.get(name, 0.0) + seconds}
-    there = shifted(trajectory.system, grid.offset, late)
-    return predict(simulate(there, trajectory.values, trajectory.x[0])) - predict(trajectory)
 
 
 def _run(fit: Fit, campaign: Campaign, run: str) -> Trajectory | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
-from discovery.diagnosis.proof import Known
+from discovery.diagnosis.left_open import Known
 from discovery.diagnosis.uphill import goes_uphill
 from discovery.diagnosis.walk import Node, walked
 from discovery.effects.hypothesis import Hypothesis, Key

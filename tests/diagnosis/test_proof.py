@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from scipy.stats import binom, ttest_1samp, wilcoxon
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.left_open import Known
 from discovery.diagnosis.proof import (
     BLOCKS,
     MULTIPLES,
     FreeRuns,
     Improvement,
-    Known,
     explained,
     free_runs,
     improvement,

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from discovery.diagnosis.proof import Known
+from discovery.diagnosis.left_open import Known
 from discovery.diagnosis.ratios import known_ratio
 
 

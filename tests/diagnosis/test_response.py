@@ -119,7 +119,9 @@ def test_nothing_is_said_of_a_single_recording() -> None:
 def test_file_and_summary_of_a_diagnosis_say_it() -> None:
     seen = campaign(EARLY, LATE)
     answer = diagnose(one_mass(), seen, ("r1", "r2"))
-    assert [p.effect for p in answer.document().physics] == ["input_path"]
+    # a path with a lag and a mass behind the frame are the same sum of two answers
+    (named,) = (p.effect for p in answer.document().physics)
+    assert named in ("input_path", "second_thermal_mass")
     assert answer.responses == ()  # what has a name is not described
     said = tuple(responses(context_of(seen, one_mass(), outputs=("Z",))))
     without = replace(answer, responses=said)

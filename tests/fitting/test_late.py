@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from discovery.diagnosis.proof import moved_by
+from discovery.diagnosis.left_open import moved_by
 from discovery.dynamics import Grid, Trajectory, make_grid, predict
 from discovery.fitting import Noise, fit_model, make_problem, predict_recording
 from discovery.fitting.impulses import inputs_in_gaps, late_switches, moved_in_gaps
