@@ -29,8 +29,7 @@ def with_repair(
         if keys in found.tried and found.tried[keys].fit.ended_early:
             found.finish(found.tried[keys])
         alone = found.tried.get(keys, verdict.answer)
-        jumps = [n.hypothesis for n in verdict.named if n.is_abrupt]
-        after = repaired(context, alone, [n.hypothesis for n in verdict.named], model, seen, jumps)
+        after = repaired(context, alone, [n.hypothesis for n in verdict.named], model, seen)
         sure = runs_away(verdict) if after is None else beyond_range(verdict, after)
         if sure is verdict:
             return verdict, alone, after
@@ -44,19 +43,18 @@ def repaired(
     chosen: Sequence[Hypothesis],
     model: Model,
     seen: Campaign,
-    jumps: Sequence[Hypothesis] = (),
 ) -> Fit | None:
     """The model with effects of an answer, fitted in the same way as the baseline of the proof; None if it
     does not stay finite from the starts of free runs.
 
-    A jump that no flow makes keeps the size that the readings next to it show: a model that is far from the
-    machine would make up for its own error with it.
+    What the answer says of the size of an effect is known before: a model that is not quite the machine
+    would make up for its own error with it, and a jump of 1.5 K would become one of 0.8 K.
     """
     grown = with_effects(model, chosen)
     values = answer.fit.model.parameters
     start = {n: values[n].value for n in grown.free if n in values}
     priors = shape_priors(chosen)  # readings may leave the shape of an effect open
-    for name in (name for h in jumps for name in h.amplitudes):
+    for name in (name for h in chosen for name in h.amplitudes):
         if (ends := answer.interval(name)) is not None:
             priors[name] = Prior(values[name].value, (ends[1] - ends[0]) / (2 * Z95))
     try:
