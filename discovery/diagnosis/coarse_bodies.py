@@ -1,21 +1,21 @@
-"""Bodies whose flows are wrong by more than those of the others.
+"""Bodies whose flows are wrong by more than those of the others, and outputs that are slower than the others.
 
 All bodies of a lumped model are off by about the same share of what flows through them. Where one body is
 modelled worse than the others, that share would make the flows of all of them uncertain, and hide what each
-other body lacks.
+other body lacks. So it is with the slow noise of one sensor.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discovery.diagnosis.context import Context, with_coarser
+from discovery.diagnosis.context import Context, with_worse
 from discovery.diagnosis.scored import Scored, is_large, under_noise_of
 from discovery.effects.hypothesis import Hypothesis
 from discovery.terms import Name
 from discovery.terms.expression import names
 
-OPENED = 16.0  # log evidence from which a body is coarse by itself: each such body takes time
+OPENED = 16.0  # log evidence from which one is worse by itself: each such takes time
 
 
 def with_coarse_bodies(context: Context, model: Scored) -> Context:
@@ -24,15 +24,29 @@ def with_coarse_bodies(context: Context, model: Scored) -> Context:
     Args:
         model: what is known so far.
     """
-    begin, chosen = model.evidence, context.settings.coarser
-    while len(chosen) + 1 < len(context.floor):
-        others = [with_coarser(context, (*chosen, s)) for s in context.floor if s not in chosen]
-        found = [(under_noise_of(other, model).evidence, k) for k, other in enumerate(others)]
-        best, k = max(found)
+    return _opened(context, model, "coarser", tuple(context.floor))
+
+
+def with_slow_outputs(context: Context, model: Scored) -> Context:
+    """The context with each output whose slow noise may be larger than that of the others, where the readings
+    show this. `model`: as in `with_coarse_bodies`.
+    """
+    return _opened(context, model, "slower", context.outputs)
+
+
+def _opened(context: Context, model: Scored, kind: str, every: tuple[str, ...]) -> Context:
+    """The context with one after the other of those that are worse than the others; at least one is not."""
+    begin = model.evidence
+    while True:
+        chosen: tuple[str, ...] = getattr(context.settings, kind)
+        left = [name for name in every if name not in chosen]
+        if len(left) < 2:
+            return context
+        others = [with_worse(context, **{kind: (*chosen, name)}) for name in left]
+        best, k = max((under_noise_of(other, model).evidence, k) for k, other in enumerate(others))
         if best < begin + OPENED:
-            break
-        context, begin, chosen = others[k], best, others[k].settings.coarser
-    return context
+            return context
+        context, begin = others[k], best
 
 
 def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> list[int]:

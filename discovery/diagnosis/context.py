@@ -223,23 +223,34 @@ def with_noise_of(context: Context, fit: Fit) -> Context:
     """
     stated = {name: context.campaign.channels[name].noise for name in context.outputs}
     white = reading_noise(fit, stated, context.floor, process_prior())
-    noises = _settings(white, context.floor, context.grids, context.settings.coarser)
+    noises = _settings(white, context.floor, context.grids, context.settings.coarser, context.settings.slower)
     if not are_others(context.formed.trajectories, fit.trajectories):
         return replace(context, settings=noises)
     form = Form.of(fit, white, context.thermometers, ambient_of(context.campaign))
     return replace(context, settings=noises, form=form, formed=fit)
 
 
-def with_coarser(context: Context, states: tuple[str, ...]) -> Context:
-    """The context with states that may be off by more than the others."""
-    return replace(context, settings=_settings(context.white, context.floor, context.grids, states))
+def with_worse(
+    context: Context, coarser: tuple[str, ...] | None = None, slower: tuple[str, ...] | None = None
+) -> Context:
+    """The context with states that may be off by more than the others, or with outputs whose slow noise may
+    be larger; None leaves them as they are.
+    """
+    known = context.settings.coarser, context.settings.slower
+    states, outputs = (old if new is None else new for old, new in zip(known, (coarser, slower), strict=True))
+    noises = _settings(context.white, context.floor, context.grids, states, outputs)
+    return replace(context, settings=noises)
 
 
 def _settings(
-    white: Noise, floor: Mapping[str, float], grids: Mapping[str, Grid], coarser: tuple[str, ...] = ()
+    white: Noise,
+    floor: Mapping[str, float],
+    grids: Mapping[str, Grid],
+    coarser: tuple[str, ...] = (),
+    slower: tuple[str, ...] = (),
 ) -> Settings:
     unsure, noisy = any(g.unsure for g in grids.values()), any(g.noisy for g in grids.values())
-    return settings(white, floor, process_prior(), unsure, noisy, coarser)
+    return settings(white, floor, process_prior(), unsure, noisy, coarser, slower)
 
 
 def thinned(grids: Mapping[str, Grid]) -> dict[str, Grid]:

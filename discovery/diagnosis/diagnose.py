@@ -14,7 +14,7 @@ import numpy as np
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.centred import centred
-from discovery.diagnosis.coarse_bodies import judging, sentences, with_coarse_bodies
+from discovery.diagnosis.coarse_bodies import judging, sentences, with_coarse_bodies, with_slow_outputs
 from discovery.diagnosis.context import Context, make_context, with_noise_of
 from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
@@ -296,6 +296,8 @@ def _under_own_noise(found: Search, tell: Callable[[str], None]) -> Search:
     with those that it leaves coarse, where they are others.
     """
     found = _with_coarse_bodies(found)
+    slower = with_slow_outputs(found.context, found.best)
+    found = found if slower is found.context else found.under(slower)
     before = found.context
     other = with_noise_of(before, found.best.fit)
     change = np.log(np.array(other.white.white) / np.array(before.white.white))

@@ -12,7 +12,7 @@ import numpy as np
 
 from discovery.fitting import Noise
 
-# of a grid; one of each coarse state follows
+# of a grid; one of each coarse state follows, and one of each slower output
 AXES = ("jitter", "rough", "slow", "level", "share", "form", "time")
 _SIZES = ("level", "share")  # that a coarse state has of its own
 JITTER = 12**-0.5  # of a logging interval: a switch that comes anywhere in it
@@ -59,12 +59,14 @@ class Settings:
         axes: jitters, noisy inputs, slow noises, levels, shares, forms and times; then, for each state
             of `coarser`, the steps by which its level and its share are above those of the others.
         coarser: states that may be off by more than the others.
+        slower: outputs whose slow noise may be larger than that of the others, by steps that follow.
     """
 
     white: Noise
     floor: Mapping[str, float]
     axes: tuple[Weighted, ...]
     coarser: tuple[str, ...] = ()
+    slower: tuple[str, ...] = ()
     known: dict[Place, Setting] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
@@ -85,10 +87,15 @@ class Settings:
         (jitter,), (rough,), (slow,), (level,), (share,), (form, edge), (part,), *steps = (
             axis[k][0] for axis, k in zip(self.axes, place, strict=True)
         )
-        above = {s: int(n) for s, (n,) in zip(self.coarser, steps, strict=True) if n}
+        parts = (*self.coarser, *self.slower)
+        above = {part: int(n) for part, (n,) in zip(enumerate(parts), steps, strict=True) if n}
+        bodies = {name: n for (k, name), n in above.items() if k < len(self.coarser)}
+        sensors = {name: n for (k, name), n in above.items() if k >= len(self.coarser)}
+        noise = with_levels(self.white, self.floor, level, share, slow)
         noise = replace(
-            with_levels(self.white, self.floor, level, share, slow),
-            force={s: self._above(place, s, n) for s, n in above.items()} or None,
+            noise,
+            slow=self._slow(place, sensors) if sensors else noise.slow,
+            force={s: self._above(place, s, n) for s, n in bodies.items()} or None,
             jitter=jitter,
             rough=rough,
             form=form,
@@ -101,18 +108,25 @@ class Settings:
 
     def _above(self, place: Place, state: str, steps: int) -> tuple[float, float]:
         """Heat and share of a state that is coarser by some steps."""
-        (level,), (share,) = (
-            self.axes[axis][min(place[axis] + steps, len(self.axes[axis]) - 1)][0]
-            for axis in map(AXES.index, _SIZES)
-        )
+        level, share = (self._up(place, axis, steps) for axis in _SIZES)
         return level * self.floor[state], share
 
+    def _slow(self, place: Place, steps: Mapping[str, int]) -> tuple[float, ...]:
+        """Slow noise of each output, where some are slower by some steps."""
+        names = zip(self.white.outputs, self.white.white, strict=True)
+        return tuple(self._up(place, "slow", steps.get(name, 0)) * white for name, white in names)
+
+    def _up(self, place: Place, axis: str, steps: int) -> float:
+        """The value of an axis some steps above a place."""
+        k = AXES.index(axis)
+        return self.axes[k][min(place[k] + steps, len(self.axes[k]) - 1)][0][0]
+
     def near(self, place: Place) -> list[Place]:
-        """The places one step away, and those where others have less of what a coarse state keeps."""
+        """The places one step away, and those where others have less of what one that is worse keeps."""
         steps = [{axis: step} for axis in range(len(place)) for step in (-1, 1)]
         for own in range(len(AXES), len(place)):
-            sizes = map(AXES.index, _SIZES)
-            steps += [{axis: -step, own: step} for axis in sizes for step in (-1, 1)]
+            sizes = _SIZES if own < len(AXES) + len(self.coarser) else ("slow",)
+            steps += [{AXES.index(axis): -step, own: step} for axis in sizes for step in (-1, 1)]
         found = [tuple(at + step.get(axis, 0) for axis, at in enumerate(place)) for step in steps]
         return [one for one in found if all(0 <= at < len(a) for at, a in zip(one, self.axes, strict=True))]
 
@@ -135,6 +149,7 @@ def settings(
     unsure: bool,
     noisy: bool,
     coarser: tuple[str, ...] = (),
+    slower: tuple[str, ...] = (),
 ) -> Settings:
     """The grid of noise settings.
 
@@ -144,21 +159,28 @@ def settings(
         unsure: inputs may be logged late, each switch by another time, or all by the same.
         noisy: inputs may be recorded with noise.
         coarser: states that may be off by more than the others.
+        slower: outputs whose slow noise may be larger than that of the others.
     """
     maybe = ((JITTER, unsure), (1.0, noisy))
     chances = [dict.fromkeys([0.0, size] if there else [0.0], 1.0) for size, there in maybe]
     single = [*chances, prior.slow, prior.levels, prior.shares]
     # a body is coarser by a step as often as a model is coarser than usual, and it may be any body
-    usual = max(prior.shares, key=lambda share: prior.shares[share])
-    weights = [w for share, w in prior.shares.items() if share >= usual]
-    steps = tuple(((float(k),), w / (len(floor) if k else 1)) for k, w in enumerate(weights))
+    bodies, sensors = _steps(prior.shares, len(floor)), _steps(prior.slow, len(white.outputs))
     axes = [
         *(tuple(((value,), weight) for value, weight in table.items()) for table in single),
         tuple(prior.forms.items()),
         tuple(((part,), weight) for part, weight in prior.times.items()),
-        *(steps for _ in coarser),
+        *(bodies for _ in coarser),
+        *(sensors for _ in slower),
     ]
-    return Settings(white, floor, tuple(axes), coarser)
+    return Settings(white, floor, tuple(axes), coarser, slower)
+
+
+def _steps(table: Mapping[float, float], count: int) -> Weighted:
+    """By how many values of a table one of several may be above the others, with weights."""
+    usual = max(table, key=lambda value: table[value])
+    weights = [weight for value, weight in table.items() if value >= usual]
+    return tuple(((float(k),), weight / (count if k else 1)) for k, weight in enumerate(weights))
 
 
 def only(noise: Noise) -> Settings:
@@ -179,13 +201,19 @@ def with_levels(white: Noise, floor: Mapping[str, float], level: float, share: f
 
 def _distance(one: Noise, other: Noise) -> float:
     """Distance of two noise settings in slow noise, form error, unrecorded heat and inputs."""
-    slow = abs(sum(one.slow) / sum(one.white) - sum(other.slow) / sum(other.white))
+    slow = sum(abs(a - b) for a, b in zip(_slowness(one), _slowness(other), strict=True))
     form = abs(one.share - other.share) + abs(one.form - other.form) + abs(one.edge - other.edge)
     here, there = (sum((noise.heat or {}).values()) for noise in (one, other))
     heat = abs(here - there) / max(here + there, 1e-300)
     alone = abs(_share_of_one(one) - _share_of_one(other))
     time = abs(log(one.heat_time / other.heat_time))
     return slow + form + alone + heat + time + abs(one.jitter - other.jitter) + abs(one.rough - other.rough)
+
+
+def _slowness(noise: Noise) -> tuple[float, float]:
+    """Slow noise of the least slow output and of the slowest, in reading noises."""
+    each = [slow / white for slow, white in zip(noise.slow, noise.white, strict=False)] or [0.0]
+    return min(each), max(each)
 
 
 def _share_of_one(noise: Noise) -> float:
