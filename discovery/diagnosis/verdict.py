@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from math import inf, sqrt
 
 from discovery.diagnosis import thresholds
@@ -47,15 +47,18 @@ class Verdict:
 def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     """What the recordings to fit say."""
     answer = posterior.instead(found.best)
+    adds = partial(added, found, answer)
     candidates = tuple(
         sorted(
             (one_named(found, posterior, answer, h) for h in answer.hypotheses),
-            key=lambda n: -added(found, answer, n.hypothesis),
+            key=lambda n: -adds(n.hypothesis),
         )
     )
     probable = [n for n in candidates if n.together >= thresholds.NAMED]
     unsure_of = [n for n in probable if not n.is_abrupt]  # a jump that no flow makes needs no good model
-    refused = {n.hypothesis.key: text for n in unsure_of if (text := vetoed(context, answer, n.hypothesis))}
+    refused = {
+        n.hypothesis.key: text for n in unsure_of if (text := vetoed(context, answer, n.hypothesis, adds))
+    }
     least = by_chance(found.gain)
 
     def level(some: Sequence[Named], goal: float) -> float:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.coarse_bodies import coarse_at
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.scored import Scored
 from discovery.effects.hypothesis import Hypothesis
 from discovery.printed import printed
 
-Veto = Callable[[Context, Scored, Hypothesis], str | None]
+Added = Callable[[Hypothesis], float]  # log evidence that goes with an effect of an answer
+Veto = Callable[[Context, Scored, Hypothesis, Added], str | None]
 
 
-def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | None:
+def every_recording(context: Context, answer: Scored, h: Hypothesis, _: Added) -> str | None:
     """What every recording shows is no event: unrecorded heat for some hours, or a clock that is wrong. An
     offset that is another one in every recording is no offset.
     """
@@ -22,7 +24,7 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
     is_event = h.effect.search == "window" or (h.effect.is_event and h.effect.is_physics)
     if not is_clock and not is_offset and not is_event:
         return None
-    alike = [o for o in answer.hypotheses if o.effect.place == h.effect.place and o.places == h.places]
+    alike = _alike(answer, h)
     if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):
         return None
     if is_clock:
@@ -49,6 +51,11 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis) -> str | No
     )
 
 
+def _alike(answer: Scored, h: Hypothesis) -> list[Hypothesis]:
+    """Effects of the kind of one, at its place, in any recording."""
+    return [o for o in answer.hypotheses if o.effect.place == h.effect.place and o.places == h.places]
+
+
 def _shift(answer: Scored, clocks: Sequence[Hypothesis], run: str) -> float:
     """By how much the clocks are shifted in a recording, all together, s."""
     mine = [o for o in clocks if o.recording in (None, run)]
@@ -59,10 +66,10 @@ def _late(seconds: float) -> str:
     return f"{printed(abs(seconds))} s {'late' if seconds >= 0 else 'early'}"
 
 
-def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str | None:
+def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis, added: Added) -> str | None:
     """An effect can only be recognised with a model that is nearly right. For a law, this is the model of the
     bodies where it acts. For events of one recording and faults of the measuring chain, it is the whole
-    model, and one with events in the place of a law is not.
+    model, and one with events in the place of a law is not, if they explain as much as a name has to.
     """
     wrong = coarse_at(answer)
     if h.states and wrong.keys() >= set(h.states):
@@ -73,7 +80,8 @@ def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str
         )
     if h.effect.is_law:
         return None
-    law = next((o for o in answer.hypotheses if every_recording(context, answer, o)), None)
+    laws = (o for o in answer.hypotheses if every_recording(context, answer, o, added))
+    law = next((o for o in laws if sum(map(added, _alike(answer, o))) >= thresholds.SHORT), None)
     if law and len(context.recordings) > 1:
         return (
             f"{h.effect.word} at {h.where} is not named: {law.effect.word} at {law.where} stands for a law "
@@ -90,6 +98,6 @@ def far_from_the_machine(context: Context, answer: Scored, h: Hypothesis) -> str
 VETOES: tuple[Veto, ...] = (every_recording, far_from_the_machine)
 
 
-def vetoed(context: Context, answer: Scored, h: Hypothesis) -> str | None:
+def vetoed(context: Context, answer: Scored, h: Hypothesis, added: Added) -> str | None:
     """The first reason for which an effect must not be named; None if there is none."""
-    return next((text for veto in VETOES if (text := veto(context, answer, h))), None)
+    return next((text for veto in VETOES if (text := veto(context, answer, h, added))), None)

@@ -252,7 +252,8 @@ def _changes(
     formula = parse(effect.formula, f"effect {effect.word}")
     if spot.terms:
         inputs = set(scene.channels) - set(model.states)
-        return tuple(_changed(effect, formula, naming, spot, term, inputs) for term in spot.terms), {}
+        terms = tuple(_changed(effect, formula, naming, spot, term, inputs) for term in spot.terms)
+        return terms, _read_otherwise(effect, formula, naming, spot, model, scene)
     if spot.outputs:
         body: dict[str, Expression] = {"body": Name(spot.bodies[0])} if spot.bodies else {"y": BEFORE}
         several = len(naming.amplitudes) > 1
@@ -293,17 +294,44 @@ def _changed(
         ends = {"body": Name(term.into), **({"other": Name(other)} if other else {})}
         change = substitute(formula, {**known, TERM: term.expression, **ends})
         return Term(f"{effect.title}: {term.name}", term.into, change, term.source, effect.word)
+    change = _replaced(effect, formula, naming, spot, term.expression, inputs)
+    return Term(f"{effect.title}: {term.name}", term.into, change, term.source, effect.word)
+
+
+def _replaced(
+    effect: Effect,
+    formula: Expression,
+    naming: _Naming,
+    spot: Spot,
+    expression: Expression,
+    inputs: set[str],
+) -> Expression:
+    """An expression with a channel replaced by the formula, or all inputs, minus the expression."""
+    known = naming.sized(effect)
     if effect.place == "inputs of a recording":
-        used = names(term.expression) & inputs
+        used = names(expression) & inputs
         swaps = {c: substitute(formula, {**known, "input": Name(c)}) for c in used}
     else:
         replaced = spot.channel or next(n.id for v in REPLACED if isinstance(n := naming.known.get(v), Name))
         swaps = {replaced: substitute(formula, {**known, "input": Name(replaced)})}
-    changed = delays_at(inputs, substitute(term.expression, swaps))  # the term may delay the channel itself
-    difference = Apply("-", (changed, term.expression))
+    changed = delays_at(inputs, substitute(expression, swaps))  # it may delay the channel itself
+    difference = Apply("-", (changed, expression))
     if effect.amplitude.name not in names(formula):  # then it switches the replacement on
         difference = Apply("*", (known[effect.amplitude.name], difference))
-    return Term(f"{effect.title}: {term.name}", term.into, difference, term.source, effect.word)
+    return difference
+
+
+def _read_otherwise(
+    effect: Effect, formula: Expression, naming: _Naming, spot: Spot, model: Model, scene: Scene
+) -> dict[str, Expression]:
+    """Changes of the outputs that use an input whose record is wrong."""
+    inputs = set(scene.channels) - set(model.states)
+    wrong = {spot.channel} if spot.channel else inputs
+    return {
+        name: _replaced(effect, formula, naming, spot, model.outputs[name], inputs)
+        for name in scene.outputs
+        if effect.place in OF_INPUTS and name in model.outputs and names(model.outputs[name]) & wrong
+    }
 
 
 def _units(h: Hypothesis, model: Model, channels: Mapping[str, Channel]) -> dict[str, str]:
