@@ -56,7 +56,7 @@ def channels_for(variable: str, effect: Effect, model: Model, scene: Scene) -> l
         and (
             effect.place.startswith("output")
             or scene.channels[n].role != "fluid flow"
-            or _is_second(n, scene)
+            or _has_no_law(n, scene)
         )
     ]
 
@@ -70,12 +70,13 @@ def is_flow_unit(unit: str) -> bool:
     return any(same_dimension(unit, flow) for flow in FLOWS)
 
 
-def _is_second(name: str, scene: Scene) -> bool:
+def _has_no_law(name: str, scene: Scene) -> bool:
     """Whether a flow is not the one in the laws of the fluid: that one is in the model, or any flow if the
-    model is dry.
+    model is dry. Where nobody reads the temperature of a fluid, there are no such laws.
     """
     flows = [n for n, c in scene.channels.items() if c.role == "fluid flow"]
-    return name in scene.unused and not scene.unused.issuperset(flows)
+    is_second = name in scene.unused and not scene.unused.issuperset(flows)
+    return is_second or all(c.role != ROLE_OF["fluid"] for c in scene.channels.values())
 
 
 def recordings_for(effect: Effect, scene: Scene) -> list[tuple[str | None, bool]]:
