@@ -8,6 +8,7 @@ from math import inf
 
 import numpy as np
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.refit import ENOUGH, LONGEST, score
 from discovery.diagnosis.scored import Scored, is_usual, whitened
@@ -20,6 +21,7 @@ from discovery.evidence.settings import AXES, Setting
 from discovery.evidence.signatures import signatures
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise
+from discovery.fitting.problem import Unknown
 from discovery.fitting.solve import solve
 
 
@@ -67,16 +69,20 @@ def scan_model(context: Context, current: Scored) -> Scan:
 
 def inside(context: Context, current: Scored) -> Whitened | None:
     """A model with each parameter that presses against a bound held where its author believes it, the others
-    fitted; None where none presses.
+    fitted; None where none presses. Where the flows are wrong by more than usual, so is each parameter that
+    is far from there.
 
     A body that lacks heat fits best without any loss: it is cut off, and heat alone fits it no better. To
     first order only a body that is alive shows that both are missing.
     """
     problem = current.fit.problem
+    far = thresholds.MISSED if not is_usual(current.settings[current.best]) else inf
     held = {
         k: u.start
         for k, u in enumerate(problem.unknowns)
-        if k not in current.seen.moving and not u.is_nuisance and u.low < u.start < u.high
+        if not u.is_nuisance
+        and u.low < u.start < u.high
+        and (k not in current.seen.moving or _from_belief(u, float(current.fit.theta[k])) > far)
     }
     if not held:
         return None
@@ -92,6 +98,13 @@ def inside(context: Context, current: Scored) -> Whitened | None:
         return None
     fit = replace(current.fit, theta=found.theta, trajectories=found.trajectories)
     return whitened(context, current.hypotheses, fit)
+
+
+def _from_belief(unknown: Unknown, value: float) -> float:
+    """How many widths of what its author believes a parameter lies from there."""
+    if unknown.belief is None:
+        return 0.0
+    return abs(float(np.log(value / unknown.start))) / unknown.belief if value > 0 else inf
 
 
 def _alike(h: Hypothesis, other: Hypothesis) -> bool:
