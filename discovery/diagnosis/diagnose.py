@@ -20,15 +20,24 @@ from discovery.diagnosis.description import Curve, Description, curves, describe
 from discovery.diagnosis.location import Location, locate
 from discovery.diagnosis.own import Searched, searched
 from discovery.diagnosis.posterior import FAR, IN_PLAY, Posterior, posterior
-from discovery.diagnosis.proof import Improvement, explained, free_runs, improvement, unit_of
+from discovery.diagnosis.proof import Improvement, explained, unit_of
 from discovery.diagnosis.repair import repaired, with_repair
 from discovery.diagnosis.response import Response, responses
 from discovery.diagnosis.scan import in_play
 from discovery.diagnosis.scored import Scored, is_usual, with_unknown
 from discovery.diagnosis.selection import Search
+from discovery.diagnosis.trial import Trial
 from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
-from discovery.diagnosis.withdrawal import idle, refuted, small, unfinished, unforeseen, wrong_readings
+from discovery.diagnosis.withdrawal import (
+    idle,
+    refuted,
+    small,
+    unfinished,
+    unforeseen,
+    without_the_least,
+    wrong_readings,
+)
 from discovery.diagnosis.written import written
 from discovery.dynamics import gaps
 from discovery.effects.catalogue import catalogue
@@ -210,54 +219,43 @@ def diagnose(
     # as if there were little process noise: where it is larger than usual, it has absorbed what is missing
     forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
     verdict = small(found, decide(context, found, chances), forces[0].gain if forces else inf)
-    verdict, alone, after = with_repair(context, found, verdict, model, seen)
-    named = [n.hypothesis for n in verdict.named]
-    noise = verdict.answer.noise
     read = [r for r in held_out if not campaign.unread([r], outputs)]
-    known = (alone if after else found.baseline).known()
-    of_fit, of_others = known.of_fit(after or before, context.usually_off), known.beside(context.usually_off)
-
-    def proved(only: Sequence[int]) -> tuple[Improvement, dict[str, Improvement], dict[str, Improvement]]:
-        """Free runs of some outputs: on all fitted recordings, on each held-out one, and on each of all."""
-        shown = [outputs[y] for y in only]
-        runs = free_runs(campaign, fit, before, after or before, noise, of_fit, only)
-        runs |= free_runs(campaign, read, before, after or before, noise, of_others, only)
-        each = {r: improvement([one], shown) for r, one in runs.items()}
-        fitting = improvement([runs[r] for r in fit if r in runs], shown)
-        return fitting, {r: each[r] for r in read if r in each}, each
-
-    every, judged = list(range(len(outputs))), judging(context, verdict.answer, named)
-    fitting, proof, each = proved(every)
-    fitted_to, unseen, all_runs = (fitting, proof, each) if judged == every else proved(judged)
-    unit = unit_of(campaign, outputs)
+    every, unit = list(range(len(outputs))), unit_of(campaign, outputs)
+    while True:
+        verdict, alone, after = with_repair(context, found, verdict, model, seen)
+        known = (alone if after else found.baseline).known()
+        trial = Trial(campaign, context, read, before, verdict.answer.noise, known)
+        judging_ones = judging(context, verdict.answer, [n.hypothesis for n in verdict.named])
+        shown = trial.runs(after or before, every)
+        judged = shown if judging_ones == every else trial.runs(after or before, judging_ones)
+        fewer = without_the_least(found, verdict, judged.held_out)
+        if fewer is verdict:
+            break
+        verdict = fewer
 
     def whole() -> Improvement | None:
         """How well the repaired model with every effect of the answer follows the fitted recordings."""
-        every = verdict.answer.hypotheses
-        fit_of_all = (
-            repaired(context, verdict.answer, every, model, seen) if len(every) > len(named) else None
-        )
-        if fit_of_all is None:
-            return None
-        of_all = known.of_fit(fit_of_all, context.usually_off)
-        runs = free_runs(campaign, fit, before, fit_of_all, noise, of_all, judged)
-        return improvement([runs[r] for r in fit if r in runs], [outputs[y] for y in judged])
+        answer, some = verdict.answer, len(verdict.answer.hypotheses) > len(verdict.named)
+        fit_of_all = repaired(context, answer, answer.hypotheses, model, seen) if some else None
+        return trial.fitted(fit_of_all, judging_ones) if fit_of_all else None
 
-    verdict = refuted(unfinished(idle(found, verdict, all_runs), fitted_to, unit, whole), unseen)
+    verdict = idle(found, verdict, judged.each)
+    verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out)
     if not verdict.named and after is not None:
         after = None
     in_fit = [h for h in hung if h.recording in fit]
-    verdict = wrong_readings(unforeseen(verdict, unseen, unit), len(context.outliers), len(in_fit))
+    verdict = unforeseen(verdict, judged.held_out, unit)
+    verdict = wrong_readings(verdict, len(context.outliers), len(in_fit))
     law = instead(context, verdict.answer) if verdict.word == UNEXPLAINED else None
     mine = tuple(searched(found, verdict, effects))
     further = [law] if law else []
     further += [_stood_still(h, campaign) for h in hung]
-    further += _reasons(context, verdict, read, proof, effects, mine)
+    further += _reasons(context, verdict, read, shown.held_out, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
     # what changes an output only has no curve of heat
-    shown = [] if chances.best.forced and not chances.best.forced_state else forces
-    unexplained = verdict.word == UNEXPLAINED and bool(shown)
+    heats = [] if chances.best.forced and not chances.best.forced_state else forces
+    unexplained = verdict.word == UNEXPLAINED and bool(heats)
     return Diagnosis(
         context=context,
         search=found,
@@ -266,14 +264,14 @@ def diagnose(
         alone=alone,
         before=before,
         after=after,
-        location=locate(context, found.baseline, verdict, chances, shown),
+        location=locate(context, found.baseline, verdict, chances, heats),
         forces=tuple(forces),
-        fit=fitting,
-        held_out=proof,
-        contradicted_by=tuple(run for run, i in unseen.items() if i.contradicts and verdict.named),
-        description=describe(context, found.baseline, shown[0]) if unexplained and not law else None,
+        fit=shown.fit,
+        held_out=shown.held_out,
+        contradicted_by=tuple(run for run, i in judged.held_out.items() if i.contradicts and verdict.named),
+        description=describe(context, found.baseline, heats[0]) if unexplained and not law else None,
         responses=tuple(responses(context)) if verdict.word == UNEXPLAINED else (),
-        curves=tuple(curves(found.baseline, shown[0])) if shown and verdict.word != NO_MISMATCH else (),
+        curves=tuple(curves(found.baseline, heats[0])) if heats and verdict.word != NO_MISMATCH else (),
         question=ask(context, found, verdict),
         seconds=clock.perf_counter() - began,
         own=mine,

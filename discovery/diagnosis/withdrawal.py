@@ -7,6 +7,7 @@ from dataclasses import replace
 from math import expm1, inf, isfinite, log
 
 from discovery.diagnosis import thresholds
+from discovery.diagnosis.named import added
 from discovery.diagnosis.proof import Improvement
 from discovery.diagnosis.scored import shapes_at_end
 from discovery.diagnosis.selection import Search
@@ -102,6 +103,19 @@ def beyond_range(verdict: Verdict, repaired: Fit) -> Verdict:
         candidates=() if kept else verdict.named,
         reasons=(*reasons, *verdict.reasons),
     )
+
+
+def without_the_least(found: Search, verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
+    """The verdict without the one of several names that adds least evidence, where unseen recordings are
+    predicted worse with all of them: one that is wrong would take the others with it.
+    """
+    other = refuted(verdict, proof)
+    if len(verdict.named) < 2 or other.named:
+        return verdict
+    least = min(verdict.named, key=lambda n: added(found, verdict.answer, n.hypothesis))
+    kept = tuple(n for n in verdict.named if n is not least)
+    reason = f"{least.hypothesis.stated} is not named: {other.reasons[0]}"
+    return replace(verdict, word=word_of(kept), named=kept, reasons=(reason, *verdict.reasons))
 
 
 def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:

@@ -29,6 +29,7 @@ from discovery.diagnosis.withdrawal import (
     small,
     unfinished,
     unforeseen,
+    without_the_least,
     wrong_readings,
 )
 from discovery.effects.catalogue import catalogue
@@ -950,6 +951,20 @@ def test_an_event_is_judged_where_it_acts() -> None:
     assert idle(cast(Any, WET), event, runs) is event
     law = said(WET, {"fluid_convection": 0.9})
     assert idle(cast(Any, WET), law, runs).named == ()
+
+
+def test_the_lesser_of_two_names_goes_first_where_unseen_recordings_refute_both() -> None:
+    """Heat of an input, and heat that is always there: the second one was wrong, and both were lost."""
+    found = pair(FLUID, FRICTION, 150.0, 100.0, 50.0)
+    named = said(found, {"fluid_convection": 0.98, "friction_speed": 0.98})
+    assert len(named.named) == 2
+    better, worse = improved(2.0, 1.0, 0.1, 1.5), improved(1.0, 2.0, -1.5, -0.5)
+    assert without_the_least(cast(Any, found), named, {"r3": better}) is named
+    fewer = without_the_least(cast(Any, found), named, {"r3": worse})
+    assert [n.hypothesis for n in fewer.named] == [FLUID]
+    assert fewer.reasons[0].startswith("friction_speed at")
+    assert "free runs on r3 are worse than without" in fewer.reasons[0]
+    assert without_the_least(cast(Any, found), fewer, {"r3": worse}) is fewer
 
 
 def test_an_event_is_not_refuted_by_what_the_fit_leaves_open() -> None:
