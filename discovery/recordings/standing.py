@@ -16,7 +16,8 @@ from discovery.recordings.columns import FEW, Array
 
 _STANDS = 5.0  # a sensor that stands still so many times longer than chance explains
 _CHANCE = 2.0  # times what chance explains, where a jump shows that the body went on
-_CAUGHT_UP = 4.0  # times the largest of the steps around: readings that come back from where they stood
+_CAUGHT_UP = 4.0  # times nearly all of the steps around: readings that come back from where they stood
+_NEARLY_ALL = 0.9  # a machine that switches makes a large step now and then
 _AROUND = 10  # steps on each side
 
 
@@ -61,9 +62,10 @@ def stood_before(readings: Array, at: int) -> bool:
 
 
 def _catches_up(readings: Array, first: int, last: int) -> bool:
-    """Whether the readings (N,) jump behind a run of equal ones, and move far less before it and after."""
+    """Whether the readings (N,) jump behind a run of equal ones, and mostly move far less before and after."""
     steps = np.abs(np.diff(readings))
     if last == steps.size:  # nothing was read behind it
         return False
     around = np.concatenate([steps[max(first - _AROUND, 0) : first], steps[last + 1 : last + 1 + _AROUND]])
-    return around.size >= _AROUND and bool(steps[last] > _CAUGHT_UP * around.max())
+    usual = np.quantile(around[around > 0.0], _NEARLY_ALL) if around.any() else 0.0
+    return around.size >= _AROUND and bool(steps[last] > _CAUGHT_UP * usual)

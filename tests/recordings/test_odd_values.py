@@ -72,6 +72,16 @@ def test_a_sensor_that_hung_while_a_body_warmed_is_known_by_the_jump_behind_it(w
     assert "for 22 readings, up to line 83" in told
 
 
+def test_one_large_step_nearby_does_not_hide_a_sensor_that_hung(write: Write) -> None:
+    """A machine that switches cools its plate by 2.5 K from one reading to the next, soon after."""
+    random = np.random.default_rng(2)
+    warming = np.round(20.0 + 50.0 * (1.0 - np.exp(-np.arange(140) / 90.0)) + random.normal(0, 0.05, 140), 2)
+    warming[60:82] = warming[60]
+    warming[88:] -= 2.5
+    [told] = found(write(with_column(1, [f"{value:.2f}" for value in warming])))
+    assert "for 22 readings, up to line 83" in told
+
+
 def test_a_sensor_that_hangs_until_the_end_of_a_short_recording_shows_no_jump(write: Write) -> None:
     """Nothing is read behind its last 22 equal readings: they may be a body that stands still."""
     warming = np.round(20.0 + np.cumsum(np.random.default_rng(2).normal(0.3, 0.05, 140)), 2)
