@@ -62,7 +62,7 @@ def stood_before(readings: Array, at: int) -> bool:
 
 
 def _catches_up(readings: Array, first: int, last: int) -> bool:
-    """Whether the readings (N,) jump behind a run of equal ones, and mostly move far less before and after."""
+    """Whether the readings (N,) jump behind a run of equal ones, and mostly move far less around."""
     steps = np.abs(np.diff(readings))
     if last == steps.size:  # nothing was read behind it
         return False

@@ -55,6 +55,37 @@ def test_a_clock_shifts_what_is_late_already() -> None:
     assert np.allclose(found, predict(trajectory(late(shifted))), rtol=0, atol=1e-9)
 
 
+def test_a_wrong_sensor_of_an_input_is_wrong_in_the_outputs_too() -> None:
+    """A sensor of the room that shows 0.5 K too little, where an error follows the difference to the room."""
+    model, _ = sample()
+    model = replace(model, outputs={**model.outputs, "E_Y": parse("2.0*(table - room)")})
+    (entry,) = (
+        e for e in catalogue().values() if (e.word, e.place) == ("sensor_offset", "input temperature")
+    )
+    (h,) = (one for one in claims(model, entry) if one.channels == ("room",) and one.recording == "two")
+    assert set(h.shown) == {"E_Y"}
+    wrong = {"room": parse("room + 0.5")}
+    right = replace(
+        model,
+        terms=tuple(replace(t, expression=substitute(t.expression, wrong)) for t in model.terms),
+        outputs={name: substitute(y, wrong) for name, y in model.outputs.items()},
+    )
+    found = predict(trajectory(h.added_to(model, {h.amplitudes[0]: 0.5})))
+    assert np.allclose(found, predict(trajectory(right)), rtol=0, atol=1e-9)
+    assert not np.allclose(found, predict(trajectory(model)), rtol=0, atol=0.1)
+
+
+def test_a_flow_is_a_factor_on_an_exchange_where_no_fluid_is_read() -> None:
+    """Laws of the fluid need its temperature; water of a seal cools a bush by what it carries to the sea."""
+    followed = {}
+    for without in ((), ("fluid temperature",)):
+        model, channels = sample(without)
+        entries = [e for e in catalogue().values() if e.word == "input_exchange" and "coolant" in e.formula]
+        found = [h for entry in entries for h in claims(model, entry, channels)]
+        followed[without] = {name for h in found for name in h.follows if name in ("pump", "spray")}
+    assert followed == {(): {"spray"}, ("fluid temperature",): {"pump", "spray"}}
+
+
 def test_a_fluid_that_is_late_already_is_later() -> None:
     baseline = late(DELAYS)
     later = claims(baseline, catalogue()["fluid_delay"])[0]

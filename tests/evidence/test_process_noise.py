@@ -125,6 +125,20 @@ def test_a_coarse_body_has_steps_of_its_own() -> None:
     assert np.exp(weights[1] - weights[0]) == pytest.approx(odds[1] / odds[0] / 2)  # two bodies
 
 
+def test_one_sensor_may_be_slower_than_the_others() -> None:
+    """It keeps its slow noise where the others lose a step."""
+    white = Noise(("T", "E", "Z"), (0.1, 2.0, 5.0))
+    grid = settings(white, {"coil": 1.0}, process_prior(), False, False, slower=("E",))
+    sizes = list(thresholds.SLOW)
+    place = (0, 0, 1, 0, 0, 0, 0, 2)
+    assert grid.at(place).noise.slow == pytest.approx((sizes[1] * 0.1, sizes[3] * 2.0, sizes[1] * 5.0))
+    near = [grid.at(one).noise.slow for one in grid.near(place)]
+    assert any(slow == pytest.approx((0.0, sizes[3] * 2.0, 0.0)) for slow in near)
+    assert grid.closest(grid.at(place).noise, lambda _: True) == place
+    weights = [grid.at((*place[:-1], k)).log_weight for k in (0, 2)]
+    assert np.exp(weights[1] - weights[0]) == pytest.approx(thresholds.SLOW[1.0] / thresholds.SLOW[0.0] / 3)
+
+
 def test_slow_noise_may_be_as_fast_as_process_noise() -> None:
     """A sensor that is updated every few seconds shows stairs: noise of seconds, not of a whole test."""
     white = Noise(("T",), (0.1,), slow_time=7200.0, heat_time=10800.0)
