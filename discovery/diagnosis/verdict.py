@@ -97,8 +97,8 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         mostly = [n for n in named if n.is_firm and _stays(n, proofs[n.hypothesis.key])]
         faults = [n.hypothesis for n in named if not n.is_firm]
         reasons += [
-            f"{h.effect.word} at {h.where} is not named: something else acts as well, and an event or a "
-            "fault can only be recognised with a model that is nearly right"
+            f"{h.stated} is not named: something else acts as well, and an event or a fault can only be "
+            "recognised with a model that is nearly right"
             for h in faults
         ]
         by_law = any(best is one for one in laws)

@@ -63,10 +63,11 @@ def _degrees(low: float, high: float) -> dict[str, Range]:
     return {"degC": Range((low, high), (-273.15, 2000.0))}
 
 
-_DEVIATION = {"um": Range((-2000.0, 2000.0)), "um/m": Range((-2000.0, 2000.0))}
+_DEVIATION = dict.fromkeys(("um", "um/m"), Range((-1e4, 1e4)))
+_CORRECTION = dict.fromkeys(("um", "um/m"), Range((-2000.0, 2000.0)))
 FLOWS = ("l/min", "kg/min")  # volume or mass, about the same number for water
-_FLOW = Range((0.0, 1e3), (0.0, 1e6))
-_POWER = {"W": Range((-50e3, 200e3)), "percent": Range((-100.0, 100.0))}
+_FLOW = Range((0.0, 1e5), (0.0, 1e6))  # up to the air of a hall
+_POWER = {"W": Range((-1e6, 1e7)), "percent": Range((-100.0, 100.0))}
 
 ROLES: dict[str, RoleFacts] = {
     "ambient temperature": _temperature(-30.0, 60.0),
@@ -82,7 +83,7 @@ ROLES: dict[str, RoleFacts] = {
     "nozzle height": RoleFacts(("mm",), ranges={"mm": Range((0.0, 2000.0))}),
     "nozzle side": RoleFacts(("1",), ranges={"1": Range((-2.0, 2.0))}),
     "error": RoleFacts(("um", "um/m"), ranges=_DEVIATION, measured=True, open=True),
-    CORRECTION: RoleFacts(("um", "um/m"), ranges=_DEVIATION),
+    CORRECTION: RoleFacts(("um", "um/m"), ranges=_CORRECTION),
     "other input": RoleFacts((), ranges=_degrees(-50.0, 300.0)),
     "other output": RoleFacts((), between="linear", measured=True),
 }
