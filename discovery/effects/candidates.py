@@ -98,8 +98,8 @@ def _bound(variable: str, channel: str, scene: Scene) -> Expression:
 
 
 def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
-    """Whether the model already has that input at that body, in proportion or with a curve as the effect has;
-    then a refit would absorb it.
+    """Whether the model already has that input at that body, in proportion or with a curve as the effect has,
+    and with a size that is free: then a refit would absorb it.
     """
     formula = parse(effect.formula)
     if spot.outputs or len(spot.bodies) != 1 or names(formula) & {"other", "ambient", *MEDIA}:
@@ -107,6 +107,7 @@ def _stands(channel: str, spot: Spot, model: Model, effect: Effect) -> bool:
     return any(
         t.into == spot.bodies[0]
         and names(t.expression) - set(model.parameters) == {channel}
+        and not names(t.expression).isdisjoint(model.free)
         and degree(t.expression, frozenset({channel})) == degree(formula, frozenset({INPUT, LEVEL}))
         for t in model.terms
         if not t.effect

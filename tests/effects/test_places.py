@@ -351,6 +351,8 @@ def test_every_recorded_input_may_be_heat_a_path_or_a_factor() -> None:
     known = replace(model, terms=(*model.terms, Term("cut", "bed", parse("loss*cut"))))
     left = {(h.channels, h.states) for h in claims(known, catalogue()["input_heat"])}
     assert left == heat - {(("cut",), ("bed",))}
+    fixed = replace(model, terms=(*model.terms, Term("cut", "bed", parse("0.5*cut"))))
+    assert {(h.channels, h.states) for h in claims(fixed, catalogue()["input_heat"])} == heat  # it may be off
 
 
 def test_nothing_rubs_in_the_sun() -> None:
