@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 
@@ -110,17 +110,20 @@ def score(
     return one if one is None else _as_reached(one)
 
 
-def rescored(context: Context, one: Scored) -> Scored:
+def rescored(context: Context, one: Scored, goal: Callable[[Noise], float] = lambda _: inf) -> Scored:
     """The score of a fitted model in another context, refitted where it can become better there: where a step
     promises it, and under little process noise, for much of it holds a fit where it is. What was read first
     is known as well as that context says.
+
+    Args:
+        goal: as in `fit_model`, under a noise.
     """
     there = scored(context, one.hypotheses, replace(one.fit, problem=one.fit.problem.spread(context.white)))
     if there.evidence == -inf:
         return there
     noises = [there.noise] if there.ahead >= MOVED else []
     noises += [context.usual] if there.noise.share > context.usual.share else []
-    tried = [score(context, one.hypotheses, noise, one.fit) for noise in noises]
+    tried = [score(context, one.hypotheses, noise, one.fit, goal=goal(noise)) for noise in noises]
     return max([_as_reached(there), *(other for other in tried if other)], key=lambda other: other.evidence)
 
 

@@ -69,14 +69,15 @@ def scan_model(context: Context, current: Scored) -> Scan:
 
 def inside(context: Context, current: Scored) -> Whitened | None:
     """A model with each parameter that presses against a bound held where its author believes it, the others
-    fitted; None where none presses. Where the flows are wrong by more than usual, so is each parameter that
-    is far from there.
+    fitted; None where none presses. Where nothing is found yet and the flows are wrong by more than usual, so
+    is each parameter that is far from there.
 
     A body that lacks heat fits best without any loss: it is cut off, and heat alone fits it no better. To
     first order only a body that is alive shows that both are missing.
     """
     problem = current.fit.problem
-    far = thresholds.MISSED if not is_usual(current.settings[current.best]) else inf
+    begins = not current.hypotheses and not is_usual(current.settings[current.best])
+    far = thresholds.MISSED if begins else inf
     held = {
         k: u.start
         for k, u in enumerate(problem.unknowns)

@@ -132,12 +132,17 @@ class Search:
         return self
 
     def under(self, context: Context) -> Search:
-        """The search under another noise: the tried models that are not far below the best, scored again."""
-        best = self.best.evidence
+        """The search under another noise: the tried models that are not far below the best, scored again. The
+        best and the one without effects come first: fits of the others end where they cannot come near.
+        """
+        best, baseline = self.best, self.baseline
         other = Search(context, self.tell, first=self.claims if self.scans else ())
-        near = [one for one in self.tried.values() if not one.hypotheses or one.evidence > best - FAR]
-
-        for one in side_by_side(lambda one: _lighter(rescored(context, one)), near):
+        for one in (best, baseline) if best is not baseline else (best,):
+            other.keep(rescored(context, one))
+        near = [one for one in self.tried.values() if one.evidence > best.evidence - FAR]
+        near = [one for one in near if one is not best and one is not baseline]
+        goal = other.goal
+        for one in side_by_side(lambda one: _lighter(rescored(context, one, goal)), near):
             other.keep(one)
         return other
 
