@@ -85,6 +85,7 @@ def score(
     start: Fit | None = None,
     sizes: Mapping[str, float] | None = None,
     goal: float = inf,
+    least: float = -inf,
 ) -> Scored | None:
     """Refit with a set of effects and score it; None if the model does not stay finite.
 
@@ -94,11 +95,12 @@ def score(
     Args:
         noise: of the first refit.
         goal: of the first refit, as in `fit_model`.
+        least: as in `scored`.
     """
     one: Scored | None = None
     for _ in range(1 + ROUNDS):
         try:
-            other = scored(context, chosen, refit(context, chosen, noise, start, sizes, goal))
+            other = scored(context, chosen, refit(context, chosen, noise, start, sizes, goal), least)
         except RunsAwayError:
             break
         if one is not None and other.reached <= one.reached:

@@ -149,11 +149,13 @@ def attempt(
     others: Sequence[Hypothesis],
     claim: Score,
     goal: Callable[[Noise], float] = lambda _: inf,
+    least: float = -inf,
 ) -> Scored | None:
     """Refit with a further candidate, starting from the sizes of the scan.
 
     Args:
         goal: as in `fit_model`, under a noise.
+        least: as in `scored`.
     """
     h = claim.hypothesis
     sizes: dict[str, float] = {}
@@ -162,7 +164,7 @@ def attempt(
         sizes = {n: max(s, low) for n, s in zip(h.amplitudes, claim.size, strict=True)}
     chosen = (*others, h)
     noises = _noises(context, current)
-    tries = [score(context, chosen, noise, current.fit, sizes, goal(noise)) for noise in noises]
+    tries = [score(context, chosen, noise, current.fit, sizes, goal(noise), least) for noise in noises]
     found = [one for one in tries if one is not None]
     return max(found, key=lambda one: one.evidence, default=None)
 

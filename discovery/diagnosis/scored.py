@@ -239,8 +239,12 @@ def whitened(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Whiten
     return Whitened(fit, context.blocks, extra, spread, form.kinds)
 
 
-def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
-    """The score of a fit with a set of effects."""
+def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit, least: float = -inf) -> Scored:
+    """The score of a fit with a set of effects.
+
+    Args:
+        least: log evidence below which its most likely noise says enough.
+    """
     seen = whitened(context, chosen, fit)
     free = [h for h in chosen if h.effect.amplitude.fixed is None]
     place = {u.name: i for i, u in enumerate(fit.problem.unknowns) if not u.is_nuisance}
@@ -258,7 +262,7 @@ def scored(context: Context, chosen: Sequence[Hypothesis], fit: Fit) -> Scored:
         bool(shapes_at_end(chosen, fit)) or goes_uphill(chosen, fit),
     )
     # a fit that ended early is no part of the answer: its most likely noise says enough
-    return _over_noise(context, bare, goal=inf if fit.ended_early else -inf)
+    return _over_noise(context, bare, goal=inf if fit.ended_early else least)
 
 
 def shapes_at_end(chosen: Sequence[Hypothesis], fit: Fit) -> list[str]:

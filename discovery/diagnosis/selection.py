@@ -311,8 +311,10 @@ class Search:
             if key not in known
         }
 
+        least = self.best.evidence - NEAR
+
         def tried(claim: Score) -> Scored | None:
-            one = attempt(self.context, start, others, claim, self.goal)
+            one = attempt(self.context, start, others, claim, self.goal, least)
             return light(one) if one is not None and one.evidence > -inf else None
 
         for one in side_by_side(tried, list(fresh.values())):
