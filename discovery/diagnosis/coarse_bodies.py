@@ -43,8 +43,7 @@ def _opened(context: Context, model: Scored, kind: str, every: tuple[str, ...]) 
         if len(left) < 2:
             return context
         others = [with_worse(context, **{kind: (*chosen, name)}) for name in left]
-        found = [under_noise_of(other, model, begin + OPENED) for other in others]
-        best, k = max((one.evidence, k) for k, one in enumerate(found))
+        best, k = max((under_noise_of(other, model).evidence, k) for k, other in enumerate(others))
         if best < begin + OPENED:
             return context
         context, begin = others[k], best

@@ -273,11 +273,9 @@ def shapes_at_end(chosen: Sequence[Hypothesis], fit: Fit) -> list[str]:
     return [n for n, shape in at_end if not shape.or_at_once or found[n].value > shape.ends[0]]
 
 
-def under_noise_of(context: Context, one: Scored, goal: float = -inf) -> Scored:
-    """The score of the same fit over the noise settings of another context; `goal`: the log evidence from
-    which it matters.
-    """
-    return _over_noise(context, one, goal=goal)
+def under_noise_of(context: Context, one: Scored) -> Scored:
+    """The score of the same fit over the noise settings of another context."""
+    return _over_noise(context, one)
 
 
 def _over_noise(
