@@ -311,7 +311,7 @@ class Search:
             if key not in known
         }
 
-        least = self.best.evidence - NEAR
+        least = start.evidence - NEAR
 
         def tried(claim: Score) -> Scored | None:
             one = attempt(self.context, start, others, claim, self.goal, least)
