@@ -87,10 +87,9 @@ class Settings:
         (jitter,), (rough,), (slow,), (level,), (share,), (form, edge), (part,), *steps = (
             axis[k][0] for axis, k in zip(self.axes, place, strict=True)
         )
-        parts = (*self.coarser, *self.slower)
-        above = {part: int(n) for part, (n,) in zip(enumerate(parts), steps, strict=True) if n}
-        bodies = {name: n for (k, name), n in above.items() if k < len(self.coarser)}
-        sensors = {name: n for (k, name), n in above.items() if k >= len(self.coarser)}
+        count = len(self.coarser)
+        bodies = {s: int(n) for s, (n,) in zip(self.coarser, steps[:count], strict=True) if n}
+        sensors = {y: int(n) for y, (n,) in zip(self.slower, steps[count:], strict=True) if n}
         noise = with_levels(self.white, self.floor, level, share, slow)
         noise = replace(
             noise,
