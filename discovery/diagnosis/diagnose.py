@@ -225,9 +225,9 @@ def diagnose(
         verdict, alone, after = with_repair(context, found, verdict, model, seen)
         known = (alone if after else found.baseline).known()
         trial = Trial(campaign, context, read, before, verdict.answer.noise, known)
-        judging_ones = judging(context, verdict.answer, [n.hypothesis for n in verdict.named])
+        judges = judging(context, verdict.answer, [n.hypothesis for n in verdict.named])
         shown = trial.runs(after or before, every)
-        judged = shown if judging_ones == every else trial.runs(after or before, judging_ones)
+        judged = shown if judges == every else trial.runs(after or before, judges)
         fewer = without_the_least(found, verdict, judged.held_out)
         if fewer is verdict:
             break
@@ -237,7 +237,7 @@ def diagnose(
         """How well the repaired model with every effect of the answer follows the fitted recordings."""
         answer, some = verdict.answer, len(verdict.answer.hypotheses) > len(verdict.named)
         fit_of_all = repaired(context, answer, answer.hypotheses, model, seen) if some else None
-        return trial.fitted(fit_of_all, judging_ones) if fit_of_all else None
+        return trial.fitted(fit_of_all, judges) if fit_of_all else None
 
     verdict = idle(found, verdict, judged.each)
     verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out)

@@ -79,7 +79,7 @@ class Known:
     late: Mapping[str, float] = field(default_factory=dict)
     fitted: Absorbed | None = None
 
-    def beside(self, usual: Usual) -> Known:
+    def of_unseen(self, usual: Usual) -> Known:
         """Of a recording that no fit has seen: the same, and the zeros of sensors, each on its own."""
         count = len(self.names)
         covariance = usual.zero**2 * np.eye(count + len(usual.sensors))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.left_open import Known
-from discovery.diagnosis.proof import Improvement, free_runs, improvement
+from discovery.diagnosis.proof import FreeRuns, Improvement, free_runs, improvement
 from discovery.fitting import Fit, Noise
 from discovery.recordings import Campaign
 
@@ -39,19 +39,20 @@ class Trial:
         """Those of some outputs, with a repaired model; `only`: their indices."""
         shown, fit = [self.context.outputs[y] for y in only], self.context.recordings
         usual = self.context.usually_off
-        found = [
-            free_runs(self.campaign, recordings, self.before, after, self.noise, known, only)
-            for recordings, known in (
-                (fit, self.known.of_fit(after, usual)),
-                (self.read, self.known.beside(usual)),
-            )
-        ]
+        found = (
+            self._free(fit, after, self.known.of_fit(after, usual), only),
+            self._free(self.read, after, self.known.of_unseen(usual), only),
+        )
         fitted, held_out = ({r: improvement([one], shown) for r, one in runs.items()} for runs in found)
         return Runs(improvement(list(found[0].values()), shown), held_out, fitted | held_out)
 
     def fitted(self, after: Fit, only: Sequence[int]) -> Improvement:
         """Those of the fitted recordings alone."""
         known = self.known.of_fit(after, self.context.usually_off)
-        fit = self.context.recordings
-        runs = free_runs(self.campaign, fit, self.before, after, self.noise, known, only)
+        runs = self._free(self.context.recordings, after, known, only)
         return improvement(list(runs.values()), [self.context.outputs[y] for y in only])
+
+    def _free(
+        self, recordings: Sequence[str], after: Fit, known: Known, only: Sequence[int]
+    ) -> dict[str, FreeRuns]:
+        return free_runs(self.campaign, recordings, self.before, after, self.noise, known, only)

@@ -67,5 +67,5 @@ def test_a_recording_of_the_fit_is_better_known() -> None:
     (run, *_) = fit.trajectories
     seen = known.of_fit(fit, ROOM).rms(run, size, [0])
     assert seen == pytest.approx(np.sqrt(np.mean(Absorbed.by(fit, ROOM).variance(run))))
-    alone = replace(known, covariance=np.zeros((1, 1))).beside(ROOM).rms(run, size, [0])
-    assert seen < alone < known.beside(ROOM).rms(run, size, [0])
+    alone = replace(known, covariance=np.zeros((1, 1))).of_unseen(ROOM).rms(run, size, [0])
+    assert seen < alone < known.of_unseen(ROOM).rms(run, size, [0])

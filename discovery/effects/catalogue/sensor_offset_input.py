@@ -1,7 +1,7 @@
 """The sensor of an input shows too much, from a recording on: it was replaced, moved, or is wrong from the
 start.
 
-    T_in + offset replaces T_in in every term of the model
+    T_in + offset replaces T_in in every term and output of the model
 
 offset in K, of either sign, 0.5 to 3 for thermocouples and for a sensor that hangs in another place. Source:
 IEC 60584-1:2013, class 2: 2.5 K. Limits: temperatures alone, up to 100 K; start values keep what was
