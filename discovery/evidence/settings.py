@@ -68,6 +68,7 @@ class Settings:
     coarser: tuple[str, ...] = ()
     slower: tuple[str, ...] = ()
     known: dict[Place, Setting] = field(default_factory=dict, init=False, repr=False, compare=False)
+    around: dict[Place, list[Place]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def usual(self) -> Setting:
@@ -122,6 +123,11 @@ class Settings:
 
     def near(self, place: Place) -> list[Place]:
         """The places one step away, and those where others have less of what one that is worse keeps."""
+        if place not in self.around:
+            self.around[place] = self._near(place)
+        return self.around[place]
+
+    def _near(self, place: Place) -> list[Place]:
         steps = [{axis: step} for axis in range(len(place)) for step in (-1, 1)]
         for own in range(len(AXES), len(place)):
             sizes = _SIZES if own < len(AXES) + len(self.coarser) else ("slow",)

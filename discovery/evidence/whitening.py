@@ -103,7 +103,7 @@ class Grams:
         """
         count, few, more = self.prior.shape[0], len(sizes), len(extra)
         last = np.arange(count - 1 - more, count - 1)
-        others = np.setdiff1d(np.arange(count - 1 - more), sizes)
+        others = np.delete(np.arange(count - 1 - more), sizes)
         order = np.concatenate([1 + others, 1 + last, 1 + np.asarray(sizes, dtype=np.intp), [0]])
         first = len(others)
         pieces = self.rows.sums[None] if weights is None else self.rows.by_block()

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from itertools import pairwise
 
 import numpy as np
@@ -37,7 +37,7 @@ def added(parts: Sequence[tuple[float, Callable[[], Array]]]) -> Array:
     are none.
     """
     found = [size**2 * covariance for size, made in parts if size and len(covariance := made())]
-    return np.sum(found, axis=0) if found else np.zeros((0, 0, 0))
+    return reduce(np.add, found) if found else np.zeros((0, 0, 0))
 
 
 def late_switches(trajectory: Trajectory) -> Array:
