@@ -67,7 +67,7 @@ def _otherwise(one: dict[str, Any], unit: str) -> str:
     if (after - before) * (one["rms_after"] - one["rms_before"]) >= 0:
         return ""
     rms = f"rms {printed(before)} -> {printed(after)}{unit}"
-    return f"; with start values from all readings, {rms}, and this one decides: how it began is not read"
+    return f"; with start values from all readings, {rms}, and this one decides"
 
 
 def _left(improvement: dict[str, Any], noise: str) -> list[str]:
@@ -125,7 +125,8 @@ def _place(claim: dict[str, Any]) -> str:
     states = claim.get("moved") or claim["states"]
     places = [f"at {', '.join(states)}"] if states else []
     places += [f"from {', '.join(claim['channels'])}"] if claim.get("channels") else []
-    return " ".join([*places, *([when(claim)] if claim.get("recording") else [])])
+    places += [when(claim)] if claim.get("recording") else []
+    return " ".join(places) or "in all recordings"
 
 
 def _is_known(q: dict[str, Any], claim: dict[str, Any]) -> bool:

@@ -91,6 +91,8 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array, time
     if not channel.is_sensor or known.size < FEW:
         return
     zeros = np.setdiff1d(_zeros(channel, read), words)
+    away = impossible_readings(channel, read)
+    left_out = "they are left out: " if zeros.size and np.isin(zeros, away).all() else ""
     yield from _findings(
         file,
         lines[known],
@@ -98,11 +100,10 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array, time
         read,
         zeros,
         "exactly zero between readings far from zero",
-        "empty the cells where nothing was measured",
+        left_out + "empty the cells where nothing was measured",
         "zeros",
         weight=4.0,
     )
-    away = impossible_readings(channel, read)
     lone = np.setdiff1d(np.union1d(lone_readings(read), away), [*words, *zeros, *listed]).astype(np.intp)
     dropped = np.intersect1d(lone, away).size
     if dropped or lone.size >= max(_MANY, _MANY_SHARE * read.size):
