@@ -48,6 +48,7 @@ from discovery.errors import UserError
 from discovery.evidence import late, noisy
 from discovery.evidence.hung import Hung, without_hung
 from discovery.evidence.latent_force import Force, latent_forces
+from discovery.evidence.outliers import without_wrong
 from discovery.fitting import Fit, fit_model
 from discovery.models import Model
 from discovery.models.units import differences
@@ -204,7 +205,13 @@ def diagnose(
     tell("fitting the baseline and its noise")
     before = fitted if fitted and not any(h.recording in fit for h in hung) else None
     before = before or fit_model(model, seen, fit, outputs, minima=True)
-    context = make_context(seen, model, fit, outputs, entries, _after(campaign, fit), before)
+    after_each = _after(campaign, fit)
+    context = make_context(seen, model, fit, outputs, entries, after_each, before)
+    if wrong := context.outliers:  # no fit may follow them
+        campaign, seen = without_wrong(campaign, wrong), without_wrong(seen, wrong)
+        before = fit_model(model, seen, fit, outputs, minima=True)
+        context = make_context(seen, model, fit, outputs, entries, after_each, before)
+        context = replace(context, outliers=(*wrong, *context.outliers))
     tell("scoring the catalogue")
     found = Search(context, lambda what: tell(f"found so far: {what}"))
     found = _with_coarse_bodies(found.begun()).grow()
@@ -239,7 +246,7 @@ def diagnose(
         fit_of_all = repaired(context, answer, answer.hypotheses, model, seen) if some else None
         return trial.fitted(fit_of_all, judges) if fit_of_all else None
 
-    verdict = idle(found, verdict, judged.each)
+    verdict = idle(found, verdict, judged.fit, judged.each)
     verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out)
     if not verdict.named and after is not None:
         after = None
@@ -250,7 +257,8 @@ def diagnose(
     mine = tuple(searched(found, verdict, effects))
     further = [law] if law else []
     further += [_stood_still(h, campaign) for h in hung]
-    further += _reasons(context, verdict, read, shown.held_out, effects, mine)
+    exact = verdict.answer if verdict.named else found.baseline
+    further += _reasons(context, verdict, exact, read, shown.held_out, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
     # what changes an output only has no curve of heat
@@ -348,12 +356,17 @@ def _stood_still(h: Hung, campaign: Campaign) -> str:
 def _reasons(
     context: Context,
     verdict: Verdict,
+    shown: Scored,
     read: Sequence[str],
     proof: dict[str, Improvement],
     effects: Sequence[Effect],
     mine: Sequence[Searched],
 ) -> list[str]:
-    """Notes for the reader about the recordings and the effects of the experiment."""
+    """Notes for the reader about the recordings and the effects of the experiment.
+
+    Args:
+        shown: the model that the answer stands on: with what is named, or without anything.
+    """
     said = []
     if lost := ", ".join(r for r in read if r not in proof):
         said.append(f"the free run of the model diverges on {lost}, so the repair cannot be tested there")
@@ -366,8 +379,7 @@ def _reasons(
     said += sentences(verdict.answer)
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
-    answer = verdict.answer
     said += gaps.sentences({run: grid.silent for run, grid in context.grids.items()})
-    if verdict.word == UNEXPLAINED:  # what a fit finds of its inputs may stand for the unknown cause
-        return [*said, *late.sentences(answer.fit, is_right=False)]
-    return [*said, *late.sentences(answer.fit), *noisy.sentences(answer.fit, answer.noise)]
+    is_right = verdict.word != UNEXPLAINED and is_usual(shown.settings[shown.best])
+    said += late.sentences(shown.fit, is_right)  # else what a fit finds of its inputs may stand for the rest
+    return said + noisy.sentences(shown.fit, shown.noise) if is_right else said

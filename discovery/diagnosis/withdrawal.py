@@ -18,16 +18,17 @@ from discovery.printed import printed
 SMALL = "what the model lacks is small: unknown heat at any body explains no more than it may by chance"
 
 
-def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Verdict:
+def idle(found: Search, verdict: Verdict, fitting: Improvement, runs: Mapping[str, Improvement]) -> Verdict:
     """No name where what was named does too little for free runs, on average over the recordings in which it
     may act: two hours of heat do nothing for the others. Logarithms of the rms are averaged: one recording of
-    another machine does not drown the rest.
+    another machine does not drown the rest. Nor where the recordings that it was fitted to become worse.
     """
     lower = _lower(i for run, i in runs.items() if _acts(verdict, run))
-    if not verdict.named or lower >= 0.5 * thresholds.MATTERS**2:
+    if not verdict.named or (lower >= 0.5 * thresholds.MATTERS**2 and not fitting.contradicts):
         return verdict
     names = " and ".join(n.hypothesis.stated for n in verdict.named)
-    reason = f"{names}: {_does(lower)}"
+    worse = f"free runs on the fitted recordings become worse (rms {_change(fitting)})"
+    reason = f"{names}: {worse if fitting.contradicts else _does(lower)}"
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
     reasons = dict.fromkeys((reason, *(coarse(found) or unrecorded(found)), *verdict.reasons))
     return replace(verdict, word=word, named=(), candidates=(), reasons=tuple(reasons))
@@ -66,6 +67,12 @@ def _does(lower: float) -> str:
     change = 100 * expm1(-lower)
     way = f"{'rises' if change == abs(change) else 'falls'} by {round(abs(change), 2):g} %"
     return f"too little for free runs (their rms {way} on average over the recordings)"
+
+
+def _change(run: Improvement) -> str:
+    """The rms before and after a repair, from the starts from which it is worse."""
+    before, after = (run.before, run.after) if run.only_from_its_first_reading else run.judged
+    return f"{printed(before)} -> {printed(after)}"
 
 
 def _lower(runs: Iterable[Improvement]) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, make_system, predict
 from discovery.fitting import Fit
+from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
@@ -95,6 +96,18 @@ def _moved(shown: Array) -> Array:
     """By how much (N,) a prediction (N,) moves over the readings around each one."""
     around = sliding_window_view(np.pad(shown, MOST, mode="edge"), 2 * MOST + 1)
     return np.asarray(np.ptp(around, axis=1))
+
+
+def without_wrong(campaign: Campaign, outliers: Sequence[Outlier]) -> Campaign:
+    """The campaign without these readings, where each is one of its stamps: a fit that does not look at the
+    readings around would follow one that is far away.
+    """
+    recordings = dict(campaign.recordings)
+    for o in outliers:
+        one = recordings[o.recording]
+        kept = np.where(one.time == o.time, np.nan, one.values[o.output])
+        recordings[o.recording] = replace(one, values={**one.values, o.output: kept})
+    return replace(campaign, recordings=recordings)
 
 
 def without(grids: Mapping[str, Grid], outliers: list[Outlier]) -> dict[str, Grid]:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from discovery.diagnosis import diagnose
 from discovery.dynamics import make_grid
 from discovery.effects.candidates import candidates
 from discovery.effects.catalogue import catalogue
 from discovery.effects.scene import Scene
-from discovery.evidence.outliers import find_outliers
+from discovery.evidence.outliers import Outlier, find_outliers, without_wrong
 from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
@@ -43,6 +44,47 @@ def test_two_wrong_readings_with_a_right_one_between_are_both_found() -> None:
     residual = noise()
     residual[[120, 122]] += (7.0, 11.0)  # as a thermistor of the Temperature Control Lab reads now and then
     assert found(residual) == [120, 122]
+
+
+def test_a_reading_is_set_aside_at_its_stamp_alone() -> None:
+    time, channels = np.arange(5.0), {"T": Channel("T", "temperature", "K", NOISE, "linear")}
+    both = {name: Recording(name, time, {"T": np.arange(5.0)}) for name in "ab"}
+    left = without_wrong(Campaign("one", channels, both), [Outlier("T", "b", 3.0, 9.0, NOISE)])
+    assert np.flatnonzero(np.isnan(left.recordings["b"].values["T"])).tolist() == [3]
+    assert np.isfinite(left.recordings["a"].values["T"]).all()
+    assert np.isfinite(both["b"].values["T"]).all()
+
+
+def test_no_fit_follows_a_reading_that_is_set_aside() -> None:
+    """A plate of a heater system in short recordings: a reading 18 K too high moved the fit that the proof
+    begins with, and the answer was `unexplained` with unknown parameters.
+    """
+    rng, time, runs = np.random.default_rng(5), np.arange(0.0, 241.0, 4.0), {}
+    for name in ("warm", "ramp", "other"):
+        heat, plate, read = np.repeat(rng.uniform(5.0, 40.0, 5), 13)[: time.size] * 0.14, 31.0, []
+        for watts in heat:
+            read.append(plate)
+            for _ in range(8):
+                plate += 0.5 * (watts - 0.3 * (plate - 29.5)) / 20.0
+        runs[name] = Recording(name, time, {"P": heat, "T": np.array(read) + rng.normal(0.0, 0.1, time.size)})
+    runs["ramp"].values["T"][30] += 18.0
+    channels = {
+        "P": Channel("P", "heat load", "W", None, "held"),
+        "T": Channel("T", "temperature", "degC", None, "linear"),
+    }
+    terms = (Term("heater", "T", parse("P")), Term("room", "T", parse("hA*(29.5 - T)")))
+    model = Model(
+        "plate",
+        {"hA": Parameter(0.5, "W/K", 0.0)},
+        {"T": State("T", "degC", 20.0, scale=1 / 20.0)},
+        terms,
+        {},
+    )
+    answer = diagnose(model, Campaign("plate", channels, runs), ["warm", "ramp"], ["other"], ["T"])
+    assert answer.verdict.word == "measurement fault"
+    assert [(o.recording, o.time) for o in answer.context.outliers] == [("ramp", 120.0)]
+    assert answer.fit.before < 0.15
+    assert abs(answer.before.model.parameters["hA"].value - 0.3) < 0.02
 
 
 def test_a_jump_a_slope_and_a_slow_start_are_no_wrong_readings() -> None:
