@@ -21,6 +21,7 @@ from discovery.printed import printed
 from discovery.recordings import Campaign
 
 SAID = 3.0  # standard errors beyond which what was found is said
+SPARSER = 2.0  # times as far apart as samples: readings of which half are missing
 SMALL = 0.25  # of an interval, below which it is not
 
 
@@ -59,14 +60,15 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
 
 
 def _possible(grid: Grid) -> dict[str, float]:
-    """Logging interval in s of each input that moves, where an output was read as often. What counts is what
-    was recorded: means over blocks of a coarsened grid follow a late stamp, too.
+    """Logging interval in s of each input that moves, where an output was read as often, but for readings
+    that are missing. What counts is what was recorded: means over blocks of a coarsened grid follow a late
+    stamp, too.
     """
     spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=np.inf)
     return {
         name: grid.logged[name]
         for name, samples in grid.samples.items()
-        if np.ptp(samples.value) > 0 and spacing <= grid.logged.get(name, 0.0)
+        if np.ptp(samples.value) > 0 and spacing < SPARSER * grid.logged.get(name, 0.0)
     }
 
 
