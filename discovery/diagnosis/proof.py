@@ -7,7 +7,7 @@ of the diagnosis. Single wrong readings are set aside.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, hypot, inf, isfinite, sqrt
 
 import numpy as np
@@ -135,7 +135,8 @@ def free_runs(
         readings = without(grids, wrong)[run].readings
         first = readings - predict(old)
         then = None if new is None else readings - predict(new)
-        started = None if new is None or then is None else _started(after, new, then, white)
+        spreads = _spreads(before, after)
+        started = None if new is None or then is None else _started(after, new, then, white, spreads)
         last = with_noise(campaign, new or old) if noise.rough else new or old
 
         def shown(left: Array) -> Array:
@@ -147,15 +148,36 @@ def free_runs(
             noise_in_free_runs(last, noise, size, mine),
             size[mine],
             known.rms(new, size, mine) if known and new else 0.0,
-            (shown(_started(before, old, first, white)), None if started is None else shown(started)),
+            (
+                shown(_started(before, old, first, white, spreads)),
+                None if started is None else shown(started),
+            ),
         )
     return found
 
 
-def _started(fit: Fit, run: Trajectory, left: Array, reading: Array) -> Array:
+def _spreads(before: Fit, after: Fit) -> dict[str, float]:
+    """How far states may begin from their starts, in either fit: a better model finds that they began closer
+    in the recordings of the fit, and is not sure for that how another one began.
+    """
+    found: dict[str, float] = {}
+    for fit in (before, after):
+        for name, state in fit.model.states.items():
+            if state.start_sd is not None:
+                found[name] = max(state.start_sd, found.get(name, 0.0))
+    return found
+
+
+def _started(fit: Fit, run: Trajectory, left: Array, reading: Array, spreads: Mapping[str, float]) -> Array:
     """Residuals (R, Y) of a free run from the starts that all its readings show; `reading`: (Y,) their noise.
     A model that misses much is not less sure where a body began that was read.
+
+    Args:
+        spreads: of the starts, by state.
     """
+    model = run.system.model
+    states = {n: replace(s, start_sd=spreads.get(n, s.start_sd)) for n, s in model.states.items()}
+    run = replace(run, system=replace(run.system, model=replace(model, states=states)))
     known = fit.offset_in(run.system.grid.recording)
     return from_known_starts(
         run, left, np.array(fit.noise.white), known, fit.together, reading, thresholds.MISSED

@@ -92,7 +92,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array, time
         return
     zeros = np.setdiff1d(_zeros(channel, read), words)
     away = impossible_readings(channel, read)
-    left_out = "they are left out: " if zeros.size and np.isin(zeros, away).all() else ""
+    gone = "they are left out: " if zeros.size and np.isin(zeros, away).all() else ""
     yield from _findings(
         file,
         lines[known],
@@ -100,7 +100,7 @@ def odd_findings(file: Path, lines: Lines, channel: Channel, column: Array, time
         read,
         zeros,
         "exactly zero between readings far from zero",
-        left_out + "empty the cells where nothing was measured",
+        gone + "empty the cells where nothing was measured",
         "zeros",
         weight=4.0,
     )
