@@ -164,7 +164,7 @@ def _smallest(found: Search) -> str:
     return (
         "these recordings would have shown " + ", ".join(texts)
         if texts
-        else "no missing physics was detected that these recordings could show"
+        else "record longer and move the inputs more: these recordings would not show a usual effect"
     )
 
 
