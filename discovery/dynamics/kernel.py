@@ -160,6 +160,32 @@ def between(which, e, read):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
+def gathered(which, e, read, begun, ended):  # type: ignore[no-untyped-def]
+    """Covariance (R - 1, n, n) at each reading instant of what has come since the one before.
+
+    Args:
+        begun, ended: (K, n, n) of what comes at the beginning and at the end of each step.
+    """
+    n = e.shape[1]
+    count = max(read.shape[0] - 1, 0)
+    found = np.zeros((count, n, n))
+    come, work = np.empty((n, n)), np.empty((n, n))
+    for r in range(count):
+        for k in range(read[r], read[r + 1]):
+            for i in range(n):
+                for j in range(n):
+                    come[i, j] = found[r, i, j] + begun[k, i, j]
+            matmul(e[which[k]], come, work)
+            for i in range(n):
+                for j in range(n):
+                    total = ended[k, i, j]
+                    for m in range(n):
+                        total += work[i, m] * e[which[k], j, m]
+                    found[r, i, j] = total
+    return found
+
+
+@njit(cache=True, nogil=True)
 def driven(which, e, w0, w1, read, f, heated, floor, share, flow):  # type: ignore[no-untyped-def]
     """The way (R - 1, n, n + q) of the states from each reading instant to the next: f (R - 1, n, n) from
     `between`, then their response to a force at each of some states.

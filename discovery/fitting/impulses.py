@@ -15,13 +15,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial, reduce
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics import Column, Trajectory, sensitivities
 from discovery.dynamics.gaps import unknown_before
+from discovery.dynamics.kernel import gathered
 from discovery.dynamics.samples import Samples
 from discovery.dynamics.sensitivity import moved_in_time, moved_terms
 from discovery.terms import Apply, Name, evaluate, rewrite
@@ -163,12 +163,8 @@ def _at_readings(trajectory: Trajectory, begun: Array, ended: Array) -> Array:
     Args:
         begun, ended: (K, n, n) what comes at the beginning and at the end of each step.
     """
-    read = trajectory.system.grid.read
-    found = np.zeros((max(len(read) - 1, 0), *begun.shape[1:]))
-    for r in np.flatnonzero([begun[a:b].any() or ended[a:b].any() for a, b in pairwise(read)]):
-        for k in range(read[r], read[r + 1]):
-            way = trajectory.e[trajectory.which[k]]
-            found[r] = way @ (found[r] + begun[k]) @ way.T + ended[k]
+    read = trajectory.system.grid.read.astype(np.int64)
+    found: Array = gathered(trajectory.which, trajectory.e, read, begun, ended)
     return found
 
 
