@@ -125,8 +125,8 @@ def _rough(readings: Sequence[Array]) -> float:
 
 def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[str, float]:
     """A first guess of how far states begin from their start that are neither read nor given a spread: a
-    share of what they move. The memory of an input may begin farther from it, if the machine is not in
-    balance with its first inputs: before the recording they may have been any that come later in it.
+    share of what they move. What a memory holds may be farther from what it is fed with, if the machine is
+    not in balance with its first inputs: before the recording that may have been any that comes later in it.
     """
     asked = [u for u in problem.unknowns if u.spread in _BEGINS and u.is_start]
     moved: dict[str, float] = {}

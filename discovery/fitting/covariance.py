@@ -126,4 +126,5 @@ def _with_spreads(problem: Problem) -> dict[str, State]:
 
 
 def _kind(state: State) -> tuple[str, bool]:
-    return state.unit, state.capacity is not None
+    """What a memory holds may be power or a temperature: each is of its own kind."""
+    return state.name if state.memory else state.unit, state.capacity is not None

@@ -283,9 +283,8 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
     states, extra = dict(model.states), []
     for apply, name in found.items():
         inner, tau = apply.arguments
-        # a memory starts settled with what it is fed with; what inputs were before is not known
-        sd = None if names(inner).isdisjoint(model.states) else 0.0
-        states[name] = State(name, "", start_sd=sd, memory=True)
+        # it starts settled; what it was fed with before, where the machine was not at rest, is not known
+        states[name] = State(name, "", memory=True)
         extra.append(Term(f"{name} follows", name, Apply("/", (Apply("-", (inner, Name(name))), tau))))
     return replace(model, states=states, terms=terms + tuple(extra), outputs=outputs)
 

@@ -4,7 +4,7 @@
 
 G_m in W/K, 5 to 200; t_m = C_m/G_m of 10 min to 4 h. Source: a hidden mass C_m behind G_m; a plate of
 thickness L has t_m = L^2/(pi^2 a), 14 to 28 min. Limits: one discrete mass leaves part of the misfit of a
-body that conducts over a distance; settled at the first instant.
+body that conducts over a distance; where the machine was not at rest, how it begins is one more unknown.
 """
 
 from discovery.effects.form import Amplitude, Effect, Example, Shape
