@@ -246,7 +246,7 @@ def diagnose(
         fit_of_all = repaired(context, answer, answer.hypotheses, model, seen) if some else None
         return trial.fitted(fit_of_all, judges) if fit_of_all else None
 
-    verdict = idle(found, verdict, judged.fit, judged.each)
+    verdict = idle(found, verdict, judged.each)
     verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out)
     if not verdict.named and after is not None:
         after = None

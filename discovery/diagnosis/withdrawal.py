@@ -18,17 +18,16 @@ from discovery.printed import printed
 SMALL = "what the model lacks is small: unknown heat at any body explains no more than it may by chance"
 
 
-def idle(found: Search, verdict: Verdict, fitting: Improvement, runs: Mapping[str, Improvement]) -> Verdict:
+def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Verdict:
     """No name where what was named does too little for free runs, on average over the recordings in which it
     may act: two hours of heat do nothing for the others. Logarithms of the rms are averaged: one recording of
-    another machine does not drown the rest. Nor where the recordings that it was fitted to become worse.
+    another machine does not drown the rest.
     """
     lower = _lower(i for run, i in runs.items() if _acts(verdict, run))
-    if not verdict.named or (lower >= 0.5 * thresholds.MATTERS**2 and not fitting.contradicts):
+    if not verdict.named or lower >= 0.5 * thresholds.MATTERS**2:
         return verdict
     names = " and ".join(n.hypothesis.stated for n in verdict.named)
-    worse = f"free runs on the fitted recordings become worse (rms {_change(fitting)})"
-    reason = f"{names}: {worse if fitting.contradicts else _does(lower)}"
+    reason = f"{names}: {_does(lower)}"
     word = UNEXPLAINED if coarse(found) else NO_MISMATCH
     reasons = dict.fromkeys((reason, *(coarse(found) or unrecorded(found)), *verdict.reasons))
     return replace(verdict, word=word, named=(), candidates=(), reasons=tuple(reasons))
@@ -67,12 +66,6 @@ def _does(lower: float) -> str:
     change = 100 * expm1(-lower)
     way = f"{'rises' if change == abs(change) else 'falls'} by {round(abs(change), 2):g} %"
     return f"too little for free runs (their rms {way} on average over the recordings)"
-
-
-def _change(run: Improvement) -> str:
-    """The rms before and after a repair, from the starts from which it is worse."""
-    before, after = (run.before, run.after) if run.only_from_its_first_reading else run.judged
-    return f"{printed(before)} -> {printed(after)}"
 
 
 def _lower(runs: Iterable[Improvement]) -> float:
@@ -164,12 +157,13 @@ def unfinished(
 
     Args:
         whole: `fitting` of the repaired model with the effects that are not sure, too: what they explain is
-            no sign of anything else. None where there are none.
+            no sign of anything else, if those with a name alone do no harm. None where there are none.
     """
     rms = fitting.judged[1 if verdict.named else 0]
     if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
         return verdict
-    if verdict.named and (other := whole()) is not None and not _misses(other, other.judged[1], power=2):
+    helps = verdict.named and not fitting.contradicts
+    if helps and (other := whole()) is not None and not _misses(other, other.judged[1], power=2):
         return verdict
     still = "still " if verdict.named else ""
     missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms, unit)}"
