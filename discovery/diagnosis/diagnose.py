@@ -225,7 +225,8 @@ def diagnose(
     tell("proving in free runs")
     # as if there were little process noise: where it is larger than usual, it has absorbed what is missing
     forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
-    verdict = small(found, decide(context, found, chances), forces[0].gain if forces else inf)
+    known_forces = forces and not chances.best.forced  # else heat of unknown cause explains most of all
+    verdict = small(found, decide(context, found, chances), forces[0].gain if known_forces else inf)
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     every, unit = list(range(len(outputs))), unit_of(campaign, outputs)
     while True:
