@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from discovery.dynamics import Trajectory, at_rest
 from discovery.errors import RunsAwayError
 from discovery.fitting.noise import Noise, roughness, white_noise
-from discovery.fitting.problem import Problem
+from discovery.fitting.problem import Key, Problem
 from discovery.fitting.solve import solve
 from discovery.models import Model
 from discovery.terms import names
@@ -123,13 +123,13 @@ def _rough(readings: Sequence[Array]) -> float:
     return max(roughness(readings), _SMALL * float(np.std(spread)) if len(spread) else 0.0)
 
 
-def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[str, float]:
+def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[Key, float]:
     """A first guess of how far states begin from their start that are neither read nor given a spread: a
     share of what they move. What a memory holds may be farther from what it is fed with, if the machine is
     not in balance with its first inputs: before the recording that may have been any that comes later in it.
     """
     asked = [u for u in problem.unknowns if u.spread in _BEGINS and u.is_start]
-    moved: dict[str, float] = {}
+    moved: dict[Key, float] = {}
     for run in runs:
         mine = [u for u in asked if u.recording == run.system.grid.recording]
         shares = {"fitted": _BEGINS["fitted"], "moved": 0.0}
@@ -137,8 +137,10 @@ def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[str, flo
             shares["moved"] = _BEGINS["moved"] * _unrest(run)
         for u in mine:
             series = run.x[:, run.system.states.index(u.name)]
-            moved[u.name] = max(moved.get(u.name, 0.0), shares[u.spread] * float(np.ptp(series)), 1e-6)
-    return moved
+            moved[u.key] = max(shares[u.spread] * float(np.ptp(series)), 1e-6)
+    # how far a body begins from its start is of the machine, what a memory holds of the recording
+    of_machine = [u for u in asked if u.spread == "fitted"]
+    return moved | {u.key: max(moved[o.key] for o in of_machine if o.name == u.name) for u in of_machine}
 
 
 def _unrest(run: Trajectory) -> float:

@@ -218,7 +218,8 @@ def fit_model(
             settled = settled and abs(np.log(together / before)) < 0.1
             spreads = _found_spreads(problem, solution.gram, theta, together)
             settled = settled and all(abs(np.log(new / old)) < 0.1 for new, old in spreads.values())
-            problem = problem.spread(current, {name: new for name, (new, _) in spreads.items()})
+            asked = [u for u in problem.unknowns if u.spread == "fitted" and u.name in spreads]
+            problem = problem.spread(current, {u.key: spreads[u.name][0] for u in asked})
         if settled and solution.converged:
             break
     assert solution is not None

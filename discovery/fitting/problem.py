@@ -35,6 +35,7 @@ FARTHEST = 1e6  # times its start that a parameter may go: no recording shows mo
 UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
 
 # given, by the noise of what is read, by how far it moves later, or found by the fit
+Key = tuple[str, str | None, bool, bool, bool]  # of an unknown: name, recording, and what it is
 Spread = Literal["given", "read", "moved", "fitted"]
 
 
@@ -71,7 +72,7 @@ class Unknown:
     is_penalty: bool = False  # the prior is that of the model, and counts once however alike readings are
 
     @property
-    def key(self) -> tuple[str, str | None, bool, bool, bool]:
+    def key(self) -> Key:
         """What distinguishes it from the others."""
         return self.name, self.recording, self.is_start, self.is_offset, self.is_late
 
@@ -114,11 +115,11 @@ class Problem:
         own = {None, *(u.recording for u in self.unknowns)}
         return {name: [i for i, u in enumerate(self.unknowns) if u.recording in (None, name)] for name in own}
 
-    def spread(self, noise: Noise, found: Mapping[str, float] | None = None) -> Problem:
+    def spread(self, noise: Noise, found: Mapping[Key, float] | None = None) -> Problem:
         """The problem with the priors of its start values as a noise has them.
 
         Args:
-            found: spread of each state that is neither read nor given one; default the stated one.
+            found: spread of each start that is neither read nor given one; default the stated one.
         """
         white = dict(zip(noise.outputs, noise.white, strict=True))
         unknowns = list(self.unknowns)
@@ -126,14 +127,16 @@ class Problem:
             if u.spread == "read":
                 system = next(s for s in self.systems if s.grid.recording == u.recording)
                 unknowns[i] = replace(u, prior=(0.0, read_spread(system, u.name, white)))
-            elif u.spread in ("moved", "fitted") and found and u.name in found:
-                unknowns[i] = replace(u, prior=(0.0, found[u.name]))
+            elif u.spread in ("moved", "fitted") and found and u.key in found:
+                unknowns[i] = replace(u, prior=(0.0, found[u.key]))
         return replace(self, unknowns=tuple(unknowns))
 
     def start_spreads(self) -> dict[str, float]:
-        """By state: the spread of its starts, where it is neither given nor read."""
-        own = (u for u in self.unknowns if u.is_start and u.spread in ("moved", "fitted"))
-        return {u.name: u.prior[1] for u in own if u.prior}
+        """By state: the spread of its starts, where it is neither given nor read; of what a memory holds, the
+        largest of a recording.
+        """
+        own = [u for u in self.unknowns if u.is_start and u.spread in ("moved", "fitted")]
+        return {u.name: max(o.prior[1] for o in own if o.name == u.name and o.prior) for u in own}
 
     def prior_rows(self, theta: Array, together: float = 1.0) -> tuple[Array, Array]:
         """What priors and beliefs add to the least squares: residual (K,) and its derivative (K, U).
