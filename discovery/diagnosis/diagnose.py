@@ -225,8 +225,8 @@ def diagnose(
     tell("proving in free runs")
     # as if there were little process noise: where it is larger than usual, it has absorbed what is missing
     forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
-    known_forces = forces and not chances.best.forced  # else heat of unknown cause explains most of all
-    verdict = small(found, decide(context, found, chances), forces[0].gain if known_forces else inf)
+    free_heat = forces[0].gain if forces and not chances.best.forced else inf  # else it explains most of all
+    verdict = small(found, decide(context, found, chances), free_heat)
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     every, unit = list(range(len(outputs))), unit_of(campaign, outputs)
     while True:
@@ -258,8 +258,8 @@ def diagnose(
     mine = tuple(searched(found, verdict, effects))
     further = [law] if law else []
     further += [_stood_still(h, campaign) for h in hung]
-    exact = verdict.answer if verdict.named else found.baseline
-    further += _reasons(context, verdict, exact, read, shown.held_out, effects, mine)
+    stands_on = verdict.answer if verdict.named else found.baseline
+    further += _reasons(context, verdict, stands_on, read, shown.held_out, effects, mine)
     verdict = replace(verdict, reasons=(*verdict.reasons, *further))
     tell("locating")
     # what changes an output only has no curve of heat
@@ -357,7 +357,7 @@ def _stood_still(h: Hung, campaign: Campaign) -> str:
 def _reasons(
     context: Context,
     verdict: Verdict,
-    shown: Scored,
+    stands_on: Scored,
     read: Sequence[str],
     proof: dict[str, Improvement],
     effects: Sequence[Effect],
@@ -366,7 +366,7 @@ def _reasons(
     """Notes for the reader about the recordings and the effects of the experiment.
 
     Args:
-        shown: the model that the answer stands on: with what is named, or without anything.
+        stands_on: the model with what is named, or without anything.
     """
     said = []
     if lost := ", ".join(r for r in read if r not in proof):
@@ -381,6 +381,8 @@ def _reasons(
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     said += gaps.sentences({run: grid.silent for run, grid in context.grids.items()})
-    is_right = verdict.word != UNEXPLAINED and is_usual(shown.settings[shown.best])
-    said += late.sentences(shown.fit, is_right)  # else what a fit finds of its inputs may stand for the rest
-    return said + noisy.sentences(shown.fit, shown.noise) if is_right else said
+    is_right = verdict.word != UNEXPLAINED and is_usual(stands_on.settings[stands_on.best])
+    said += late.sentences(
+        stands_on.fit, is_right
+    )  # else what a fit finds of its inputs may stand for the rest
+    return said + noisy.sentences(stands_on.fit, stands_on.noise) if is_right else said
