@@ -248,7 +248,7 @@ def diagnose(
         return trial.fitted(fit_of_all, judges) if fit_of_all else None
 
     verdict = idle(found, verdict, judged.each)
-    verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out)
+    verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out, judged.fit)
     if not verdict.named and after is not None:
         after = None
     in_fit = [h for h in hung if h.recording in fit]

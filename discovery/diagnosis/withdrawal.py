@@ -15,6 +15,7 @@ from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict
 from discovery.fitting import Fit
 from discovery.printed import printed
 
+FITTED = "the recordings to fit"
 SMALL = "what the model lacks is small: unknown heat at any body explains no more than it may by chance"
 
 
@@ -118,25 +119,32 @@ def without_the_least(found: Search, verdict: Verdict, proof: Mapping[str, Impro
     return replace(verdict, word=word_of(kept), named=kept, reasons=(reason, *verdict.reasons))
 
 
-def refuted(verdict: Verdict, proof: Mapping[str, Improvement]) -> Verdict:
-    """The verdict with its names withdrawn where unseen recordings are predicted worse with them, on average
-    over the recordings (of the logarithm of the rms). An event of a recording to fit does not act there;
+def refuted(
+    verdict: Verdict, proof: Mapping[str, Improvement], fitting: Improvement | None = None
+) -> Verdict:
+    """The verdict with its names withdrawn where recordings are predicted worse with them, and unseen ones on
+    average (of the logarithm of the rms). An event of a recording to fit does not act in another one;
     parameters that are fitted next to it speak against it if they miss by more than the fit leaves open.
+
+    Args:
+        proof: of unseen recordings.
+        fitting: of the recordings to fit together, if they are asked, too.
     """
+    every = {**proof, FITTED: fitting} if fitting else proof
     worse = [
-        run for run, i in proof.items() if i.contradicts and (_acts(verdict, run) or _misses(i, i.judged[1]))
+        run for run, i in every.items() if i.contradicts and (_acts(verdict, run) or _misses(i, i.judged[1]))
     ]
     if not verdict.named or not worse:
         return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
     if _lower(proof.values()) >= 0:
         shown, check = "", "whether the machine was the same there, and how it began"
-        if all(proof[run].only_from_its_first_reading for run in worse):
+        if all(every[run].only_from_its_first_reading for run in worse):
             shown, check = " from its first reading alone", "how it began, and the inputs that are not sure"
         better = "better over all held-out recordings"
-        if len(worse) == len(proof):  # each of them is better from other starts
+        if len(worse) == len(every):  # each of them is better from other starts
             better = "better from each start within its spread (rms "
-            better += ", ".join("{} -> {}".format(*map(printed, proof[run].judged)) for run in worse) + ")"
+            better += ", ".join("{} -> {}".format(*map(printed, every[run].judged)) for run in worse) + ")"
         reason = (
             f"with {names}, free runs are {better}, but worse on {', '.join(worse)}{shown}: check {check}"
         )
@@ -157,13 +165,12 @@ def unfinished(
 
     Args:
         whole: `fitting` of the repaired model with the effects that are not sure, too: what they explain is
-            no sign of anything else, if those with a name alone do no harm. None where there are none.
+            no sign of anything else. None where there are none.
     """
     rms = fitting.judged[1 if verdict.named else 0]
     if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
         return verdict
-    helps = verdict.named and not fitting.contradicts
-    if helps and (other := whole()) is not None and not _misses(other, other.judged[1], power=2):
+    if verdict.named and (other := whole()) is not None and not _misses(other, other.judged[1], power=2):
         return verdict
     still = "still " if verdict.named else ""
     missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms, unit)}"

@@ -294,12 +294,9 @@ def _levers(run: Trajectory, scales: Mapping[str, tuple[float, float]], index: i
 
 
 def scales_of(trajectories: Sequence[Trajectory]) -> dict[str, tuple[float, float]]:
-    """Mean and spread of each series that moves, inputs of the model and states, over all recordings. What
-    follows an input that no law has is an effect of that input, no error of a law.
-    """
-    system, found = trajectories[0].system, {}
-    used = [name for name in system.grid.samples if name in system.model.inputs]
-    for name in (*used, *system.states):
+    """Mean and spread of each series that moves, inputs and states, over all recordings."""
+    found = {}
+    for name in (*trajectories[0].system.grid.samples, *trajectories[0].system.states):
         series = np.concatenate([np.ravel(t.at_ends()[name]) for t in trajectories])
         if np.ptp(series) > 1e-9 * (1.0 + np.abs(series).max()):
             found[name] = (float(series.mean()), float(series.std()))

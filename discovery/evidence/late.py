@@ -21,7 +21,6 @@ from discovery.printed import printed
 from discovery.recordings import Campaign
 
 SAID = 3.0  # standard errors beyond which what was found is said
-SPARSER = 2.0  # times as far apart as samples: readings of which half are missing
 SMALL = 0.25  # of an interval, below which it is not
 
 
@@ -65,11 +64,8 @@ def _possible(grid: Grid) -> dict[str, float]:
     stamp, too.
     """
     spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=np.inf)
-    return {
-        name: grid.logged[name]
-        for name, samples in grid.samples.items()
-        if np.ptp(samples.value) > 0 and spacing < SPARSER * grid.logged.get(name, 0.0)
-    }
+    moving = [n for n, one in grid.samples.items() if n in grid.logged and np.ptp(one.value) > 0]
+    return {n: grid.logged[n] for n in moving if np.rint(spacing / grid.logged[n]) <= 1}
 
 
 def sentences(fit: Fit, is_right: bool = True) -> list[str]:

@@ -141,8 +141,7 @@ def test_where_nothing_is_named_it_says_what_free_runs_leave(tmp_path: Path) -> 
     [
         (
             [1.11, 0.466],
-            "; with start values from all readings, rms 1.11 -> 0.466 K, and this one decides: how it began "
-            "is not read",
+            "; with start values from all readings, rms 1.11 -> 0.466 K, and this one decides",
         ),
         ([1.11, 1.3], ""),
     ],

@@ -840,6 +840,28 @@ def test_unseen_recordings_withdraw_a_name_and_never_add_one() -> None:
     assert refuted(unnamed, {"r3": better}) is unnamed
 
 
+def test_a_name_must_not_harm_the_recordings_that_it_was_fitted_to() -> None:
+    """A vessel with two heaters whose stamps had slipped: a pulse of heat in one recording to fit, 90 %, with
+    an effect next to it that is not sure. An unseen recording in which it does not act is open within 19.9 K.
+    """
+    pulse = said(
+        Tried([Model((replace(SUN, acting=("r2",)),), 50.0), Model((), 0.0)]), {"unmeasured_heat": 0.9}
+    )
+    harm = Improvement(12.3, 21.1, 2.0, -16.1, -1.8, {}, started=(12.2, 8.75, 1.0, 5.0))
+    worse = Improvement(12.1, 24.7, 2.8, -17.3, -6.4, {}, unsure=19.7, started=(11.9, 24.1, -17.0, -6.0))
+    assert refuted(pulse, {"r3": worse}).named
+    withdrawn = refuted(pulse, {"r3": worse}, harm)
+    assert (withdrawn.word, withdrawn.named) == ("unexplained", ())
+    assert withdrawn.reasons[0].endswith("free runs on the recordings to fit are worse than without")
+    # a hidden mass of a recording that began warm is better from the starts that all readings show
+    better = Improvement(2.0, 1.0, 1.0, 0.5, 1.5, {})
+    kept = refuted(
+        pulse, {"r3": better}, Improvement(2.2, 5.9, 1.5, -4.0, -3.0, {}, started=(2.15, 3.1, 0.9, 1.3))
+    )
+    assert kept.named == pulse.named
+    assert "worse on the recordings to fit from its first reading alone" in kept.reasons[-1]
+
+
 def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     """Twice what noise (0.8) and parameters (0.6) together make likely."""
     nothing = said(Tried([Model((), 0.0)]), {})
@@ -895,10 +917,6 @@ def test_what_unsure_effects_explain_is_no_sign_of_anything_else() -> None:
     assert unfinished(fault, run, "K", lambda: close) is fault
     assert unfinished(fault, run, "K", lambda: far).named == ()
     assert unfinished(fault, run, "K", lambda: None).named == ()
-    # a vessel with two heaters whose stamps had slipped: a pulse of heat harms without an effect that is not
-    # sure
-    harm = Improvement(12.3, 21.1, 2.0, -16.1, -1.8, {}, started=(12.2, 8.75, 1.0, 5.0))
-    assert unfinished(fault, harm, "K", lambda: close).named == ()
 
 
 def test_a_model_that_misses_its_own_recordings_does_not_lack_nothing() -> None:

@@ -16,7 +16,6 @@ from discovery.evidence.form_error import (
     inner_columns,
     inside_columns,
     place_columns,
-    scales_of,
 )
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Noise, fit_model
@@ -169,24 +168,6 @@ def test_places_explain_what_lumping_a_bar_of_two_cells_leaves(run: Trajectory) 
     rest = left - columns @ np.linalg.lstsq(columns, left, rcond=None)[0]
     assert np.std(left) > 1.0
     assert np.std(rest) < 0.1 * np.std(left)
-
-
-def test_no_law_is_off_with_an_input_that_the_model_does_not_have() -> None:
-    """A plate whose fan is recorded and not in its model: laws that were wrong with the fan explained it, and
-    heat that follows the fan had no name.
-    """
-    fan = {"fan": ("other input", "1", None)}
-    kinds = {"u": ("heat load", "W", None), "T": ("temperature", "degC", 0.1)} | fan
-    channels = {name: Channel(name, role, unit, sd, "held") for name, (role, unit, sd) in kinds.items()}
-    series = {"u": np.sin(TIME / 5000), "fan": np.cos(TIME / 7000), "T": 20 + 0 * TIME}
-    campaign = Campaign("c", channels, {"r": Recording("r", TIME, series)})
-    state = State("T", "degC", C, parse("20"), 0.0, 1 / C)
-    cooled = Term("fan", "T", parse("hA*fan*(20 - T)"))
-    for terms, known in (((), {"u", "T"}), ((cooled,), {"u", "T", "fan"})):
-        all_terms = (Term("load", "T", parse("u")), *terms)
-        model = Model("one", {"hA": Parameter(HA)}, {"T": state}, all_terms, {"T": parse("T")})
-        grid = make_grid(campaign, "r", ["u", "fan"], ("T",))
-        assert scales_of([simulate(make_system(model, grid), model.values())]).keys() == known
 
 
 @pytest.mark.parametrize("effect", catalogue().values(), ids=list(catalogue()))

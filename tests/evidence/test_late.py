@@ -114,8 +114,12 @@ def test_what_may_stand_for_an_unknown_cause_is_said_otherwise(
     monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
     monkeypatch.setattr(module, "not_offered", lambda *_: [])
     context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=(), grids={})
-    answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)))
-    assert module._reasons(context, SimpleNamespace(word=word, answer=answer), [], {}, [], []) == said
+    monkeypatch.setattr(module, "is_usual", lambda usual: usual)
+    answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)), settings=[True], best=0)
+    assert module._reasons(context, SimpleNamespace(word=word, answer=answer), answer, [], {}, [], []) == said
+    much = SimpleNamespace(fit=None, noise=answer.noise, settings=[False], best=0)
+    told = module._reasons(context, SimpleNamespace(word=word, answer=much), much, [], {}, [], [])
+    assert told == ["unsure"]
 
 
 def test_a_shift_by_more_than_a_logger_makes_may_be_a_dead_time() -> None:
