@@ -137,7 +137,7 @@ def refuted(
     if not verdict.named or not worse:
         return verdict
     names = " and ".join(f"{n.hypothesis.effect.word} at {n.hypothesis.where}" for n in verdict.named)
-    if _lower(proof.values()) >= 0:
+    if _lower((proof or every).values()) >= 0:
         shown, check = "", "whether the machine was the same there, and how it began"
         if all(every[run].only_from_its_first_reading for run in worse):
             shown, check = " from its first reading alone", "how it began, and the inputs that are not sure"

@@ -855,11 +855,15 @@ def test_a_name_must_not_harm_the_recordings_that_it_was_fitted_to() -> None:
     assert withdrawn.reasons[0].endswith("free runs on the recordings to fit are worse than without")
     # a hidden mass of a recording that began warm is better from the starts that all readings show
     better = Improvement(2.0, 1.0, 1.0, 0.5, 1.5, {})
-    kept = refuted(
-        pulse, {"r3": better}, Improvement(2.2, 5.9, 1.5, -4.0, -3.0, {}, started=(2.15, 3.1, 0.9, 1.3))
-    )
-    assert kept.named == pulse.named
+    unknown = Improvement(2.2, 5.9, 1.5, -4.0, -3.0, {}, started=(2.15, 1.03, 0.9, 1.3))
+    assert refuted(pulse, {"r3": better}, unknown) is pulse
+    law = said(WET, {"fluid_convection": 0.9})
+    kept = refuted(law, {"r3": better}, unknown)
+    assert kept.named == law.named
     assert "worse on the recordings to fit from its first reading alone" in kept.reasons[-1]
+    alone = refuted(law, {}, unknown)
+    assert "free runs are better from each start within its spread" in alone.reasons[-1]
+    assert refuted(pulse, {}, Improvement(1.0, 3.0, 0.5, -2.5, -1.5, {})).named == ()
 
 
 def test_what_only_unseen_recordings_show_is_unexplained() -> None:
