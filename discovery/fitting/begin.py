@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from discovery.dynamics import Trajectory, at_rest
 from discovery.errors import RunsAwayError
 from discovery.fitting.noise import Noise, roughness, white_noise
-from discovery.fitting.problem import Key, Problem
+from discovery.fitting.problem import Key, Problem, Unknown
 from discovery.fitting.solve import solve
 from discovery.models import Model
 from discovery.terms import names
@@ -20,6 +20,7 @@ from discovery.threads import side_by_side
 
 Array = NDArray[np.float64]
 
+SETTLED = 1e-6  # in the unit of a state, no spread to speak of
 _BEGINS = {"fitted": 0.05, "moved": 0.5}  # of what a state moves, how far from its start it may begin
 _APART, _SEVERAL = 0.7, 5  # of logarithms of sizes: how far other beginnings are, and how many are drawn
 _LOOK, _ROUGHLY = 15, 1e-3  # steps from each of them, and the relative change of the cost that ends them
@@ -137,10 +138,15 @@ def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[Key, flo
             shares["moved"] = _BEGINS["moved"] * _unrest(run)
         for u in mine:
             series = run.x[:, run.system.states.index(u.name)]
-            moved[u.key] = max(shares[u.spread] * float(np.ptp(series)), 1e-6)
+            moved[u.key] = max(shares[u.spread] * float(np.ptp(series)), SETTLED)
     # how far a body begins from its start is of the machine, what a memory holds of the recording
     of_machine = [u for u in asked if u.spread == "fitted"]
     return moved | {u.key: max(moved[o.key] for o in of_machine if o.name == u.name) for u in of_machine}
+
+
+def is_settled(u: Unknown) -> bool:
+    """Whether this is what a memory holds where a recording begins at rest: nothing unknown."""
+    return u.spread == "moved" and u.prior is not None and u.prior[1] <= SETTLED
 
 
 def _unrest(run: Trajectory) -> float:

@@ -111,10 +111,14 @@ def _with_spreads(problem: Problem) -> dict[str, State]:
     """The states with the spread of their starts in recordings that no fit has seen.
 
     One recording says little about the start of one body. The mean over all bodies of its kind counts as
-    `FORMER` recordings, as the spread before does in a fit.
+    `FORMER` recordings, as the spread before does in a fit. A memory that no recording shows but at rest is
+    settled.
     """
-    states = dict(problem.model.states)
     found = problem.start_spreads()
+    states = {
+        name: replace(one, start_sd=0.0) if one.memory and name not in found else one
+        for name, one in problem.model.states.items()
+    }
     for name, sd in found.items():
         alike = [found[other] ** 2 for other in found if _kind(states[other]) == _kind(states[name])]
         recordings = sum(u.name == name and u.is_start for u in problem.unknowns)

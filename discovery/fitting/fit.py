@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discovery.dynamics import Grid, Trajectory
 from discovery.errors import RunsAwayError
-from discovery.fitting.begin import another_minimum, first_noise, first_spreads, gains_first
+from discovery.fitting.begin import another_minimum, first_noise, first_spreads, gains_first, is_settled
 from discovery.fitting.covariance import covariance_of, with_intervals
 from discovery.fitting.kalman import innovations
 from discovery.fitting.noise import Noise, readings_as_one, resolution, white_noise
@@ -188,6 +188,8 @@ def fit_model(
     current = noise or first_noise(problem, runs, stated, least)
     weighed = any((u.prior and not u.is_penalty) or u.is_nuisance for u in problem.unknowns)
     problem = problem.spread(current, first_spreads(problem, runs))
+    kept = [i for i, u in enumerate(problem.unknowns) if not is_settled(u)]
+    problem, theta = problem.among(kept), theta[kept]
     together = 1.0
     rounds = _ROUNDS if noise is None or weighed else 1
     unknown = noise is None and any(stated[name] is None for name in problem.outputs)
@@ -288,6 +290,9 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
     grids = {s.grid.recording: s.grid for s in fit.problem.systems}
     problem = make_problem(model, campaign, list(grids), fit.problem.outputs, grids)
     place = {u.key: i for i, u in enumerate(fit.problem.unknowns)}
+    problem = problem.among(
+        [i for i, u in enumerate(problem.unknowns) if u.spread != "moved" or u.key in place]
+    )
     index = [place[u.key if u.key in place else replace(u, recording=None).key] for u in problem.unknowns]
     theta = fit.theta[index]
     return replace(

@@ -131,6 +131,10 @@ class Problem:
                 unknowns[i] = replace(u, prior=(0.0, found[u.key]))
         return replace(self, unknowns=tuple(unknowns))
 
+    def among(self, kept: Sequence[int]) -> Problem:
+        """The problem with some of its unknowns, in their order; the others stay where they begin."""
+        return replace(self, unknowns=tuple(self.unknowns[i] for i in kept))
+
     def start_spreads(self) -> dict[str, float]:
         """By state: the spread of its starts, where it is neither given nor read; of what a memory holds, the
         largest of a recording.
