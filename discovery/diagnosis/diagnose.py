@@ -382,7 +382,6 @@ def _reasons(
     said += [one.sentence() for one in mine if not one.named]
     said += gaps.sentences({run: grid.silent for run, grid in context.grids.items()})
     is_right = verdict.word != UNEXPLAINED and is_usual(stands_on.settings[stands_on.best])
-    said += late.sentences(
-        stands_on.fit, is_right
-    )  # else what a fit finds of its inputs may stand for the rest
+    # if it is not, what a fit finds of its inputs may stand for what is missing
+    said += late.sentences(stands_on.fit, is_right)
     return said + noisy.sentences(stands_on.fit, stands_on.noise) if is_right else said

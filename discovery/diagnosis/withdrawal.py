@@ -140,7 +140,7 @@ def refuted(
     if _lower((proof or every).values()) >= 0:
         shown, check = "", "whether the machine was the same there, and how it began"
         if all(every[run].only_from_its_first_reading for run in worse):
-            shown, check = " from its first reading alone", "how it began, and the inputs that are not sure"
+            shown, check = " from the first reading alone", "how it began, and the inputs that are not sure"
         better = "better over all held-out recordings"
         if len(worse) == len(every):  # each of them is better from other starts
             better = "better from each start within its spread (rms "

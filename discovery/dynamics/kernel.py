@@ -161,10 +161,14 @@ def between(which, e, read):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def gathered(which, e, read, begun, ended):  # type: ignore[no-untyped-def]
-    """Covariance (R - 1, n, n) at each reading instant of what has come since the one before.
+    """Covariance (R - 1, n, n) at each reading instant of what has come since the one before:
+
+        P <- e (P + begun) e^T + ended    over each step, from zero
 
     Args:
-        begun, ended: (K, n, n) of what comes at the beginning and at the end of each step.
+        which, e: (K,) and (M, n, n) transition matrix of each step.
+        read: (R,) nodes of the readings.
+        begun, ended: (K, n, n) covariance of what comes at the beginning and at the end of each step.
     """
     n = e.shape[1]
     count = max(read.shape[0] - 1, 0)

@@ -115,7 +115,7 @@ def _place(one: Mapping[str, Any]) -> str:
         when(one) if one.get("recording") else "",
         _hours(one),
     ]
-    return " ".join(part for part in parts if part) or "all inputs"
+    return " ".join(part for part in parts if part) or "in all recordings"
 
 
 def _hours(one: Mapping[str, Any]) -> str:

@@ -860,7 +860,7 @@ def test_a_name_must_not_harm_the_recordings_that_it_was_fitted_to() -> None:
     law = said(WET, {"fluid_convection": 0.9})
     kept = refuted(law, {"r3": better}, unknown)
     assert kept.named == law.named
-    assert "worse on the recordings to fit from its first reading alone" in kept.reasons[-1]
+    assert "worse on the recordings to fit from the first reading alone" in kept.reasons[-1]
     alone = refuted(law, {}, unknown)
     assert "free runs are better from each start within its spread" in alone.reasons[-1]
     assert refuted(pulse, {}, Improvement(1.0, 3.0, 0.5, -2.5, -1.5, {})).named == ()
@@ -952,7 +952,7 @@ def test_what_is_worse_from_the_first_reading_alone_is_told_so() -> None:
     start = replace(improved(12.6, 17.4, -6.0, -3.5), started=(4.5, 2.7, 1.0, 2.5))
     kept = refuted(named, {"hold": start})
     assert kept.word == "missing physics"
-    said_of_it = "better from each start within its spread (rms 4.5 -> 2.7), but worse on hold from its first"
+    said_of_it = "better from each start within its spread (rms 4.5 -> 2.7), but worse on hold from the first"
     assert f"{said_of_it} reading alone: check how it began" in kept.reasons[-1]
 
 
