@@ -187,8 +187,8 @@ def offset_notes(fit: Fit, channels: Mapping[str, Channel]) -> list[str]:
         far = ", far beyond it: the model lacks something, or `spread` is too small" if times > _FAR else ""
         notes.append(
             f"{name} is known within {channels[name].spread:.3g} {unit}; estimated offset: "
-            f"{found[low][0]:+.2g} {unit} in '{low}'{most}{far}; in a held-out recording, only the first "
-            "reading is used to estimate it"
+            f"{found[low][0]:+.2g} {unit} in '{low}'{most}{far}; in a held-out recording, these and "
+            "the first reading are used to estimate it"
         )
     return notes
 

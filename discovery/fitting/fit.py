@@ -79,13 +79,14 @@ class Fit:
 
     @property
     def zeros(self) -> dict[str, tuple[float, float]]:
-        """Of each output with a zero of its own in each recording: its mean and spread in another one.
+        """Of each output with a zero of its own in each recording, and each input known only within a spread:
+        mean and spread of its offset in another one.
 
-        A mixture: recordings of the fit count once each, the spread that they show as one part of their
-        number.
+        A mixture: recordings of the fit count once each, the spread that they show, or that is stated, as one
+        part of their number.
         """
         found = {}
-        for name in {*self.offsets}.intersection(self.problem.outputs):
+        for name in self.offsets:
             shown = max(
                 u.prior[1] for u in self.problem.unknowns if u.is_offset and u.name == name and u.prior
             )
@@ -135,7 +136,7 @@ def fit_model(
     loss: Loss = "linear",
     grids: Mapping[str, Grid] | None = None,
     priors: Mapping[str, Prior] | None = None,
-    belief: float | None = None,
+    belief: Mapping[str, float] | None = None,
     guess: Mapping[str, float] | None = None,
     begin: Fit | None = None,
     max_rounds: int = 60,

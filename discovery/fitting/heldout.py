@@ -57,7 +57,8 @@ def predict_recording(
             they err.
         known: offsets of inputs that a fit found in this recording (`Fit.offset_in`); the first reading
             corrects only the others.
-        zeros: mean and spread of the zero of an output in a recording that no fit has seen (`Fit.zeros`).
+        zeros: mean and spread of the zero of an output, or of the offset of an input, in a recording that no
+            fit has seen (`Fit.zeros`).
     """
     model = expanded(model, campaign.channels)
     if grid is None:
@@ -69,7 +70,8 @@ def predict_recording(
             return run
         grid = grid.divided(parts)
     known = known or {}
-    others = {name: one for name, one in (zeros or {}).items() if name in outputs and name not in known}
+    not_known = {*outputs, *grid.spread} - {*known}
+    others = {name: one for name, one in (zeros or {}).items() if name in not_known}
     grid = replace(grid, spread={**grid.spread, **{name: sd for name, (_, sd) in others.items()}})
     begun = {**known, **{name: mean for name, (mean, _) in others.items()}}
     system = shifted(make_system(model, grid), begun)
