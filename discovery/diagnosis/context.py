@@ -80,7 +80,7 @@ class Context:
     baseline: Fit
     settings: Settings
     floor: Mapping[str, float]  # of the process noise of each state at level one
-    belief: float  # log of the factor within which its start values are known
+    belief: Mapping[str, float]  # log of the factor within which each of its start values is known
     outliers: tuple[Outlier, ...]  # set aside
     form: Form  # of models with effects: of the baseline, later of the answer
     formed: Fit  # where it was found
@@ -153,7 +153,8 @@ def make_context(
     inputs = recorded_inputs(campaign, recordings, outputs)
     whole = {r: make_grid(campaign, r, inputs, outputs, coarse=NODES, most=2 * NODES) for r in recordings}
     # a guess may be as far off as usual sizes lie apart: without any belief a capacity of 100 J/K became 1e8
-    belief = 2 * log(thresholds.FACTOR) if model.guessed else thresholds.BELIEF
+    width = 2 * log(thresholds.FACTOR) if model.guessed else thresholds.BELIEF
+    belief = dict.fromkeys(model.free, width)  # the sizes of effects are free
     stated = {name: campaign.channels[name].noise for name in outputs}
 
     def fitted(grids: Mapping[str, Grid], begin: Fit | None = None) -> Fit:

@@ -223,7 +223,7 @@ def make_problem(
     outputs: Sequence[str] | None = None,
     grids: Mapping[str, Grid] | None = None,
     priors: Mapping[str, Prior] | None = None,
-    belief: float | None = None,
+    belief: Mapping[str, float] | None = None,
 ) -> Problem:
     """Bind a model to recordings and lay out its unknowns.
 
@@ -231,8 +231,8 @@ def make_problem(
         outputs: measured channels to compare; default every output of the model that the campaign measures.
         grids: grids made before, by recording (a model with the same inputs may share them).
         priors: by parameter.
-        belief: believe positive start values within a factor exp(belief), with heavy tails; default not at
-        all.
+        belief: by parameter, the b of a factor exp(b) within which its start value is believed, if it is
+            positive, with heavy tails.
     """
     model = expanded(model, campaign.channels)
     if outputs is None:
@@ -245,7 +245,8 @@ def make_problem(
             systems.append(evened(make_system(model, make_grid(campaign, recording, inputs, outputs))))
         else:
             systems.append(make_system(model, grid.shifted({}) if grid.offset or grid.late else grid))
-    return Problem(model, tuple(systems), tuple(_unknowns(model, systems, recordings, priors or {}, belief)))
+    unknowns = _unknowns(model, systems, recordings, priors or {}, belief or {})
+    return Problem(model, tuple(systems), tuple(unknowns))
 
 
 def _unknowns(
@@ -253,7 +254,7 @@ def _unknowns(
     systems: Sequence[System],
     recordings: Sequence[str],
     priors: Mapping[str, Prior],
-    belief: float | None,
+    belief: Mapping[str, float],
 ) -> list[Unknown]:
     """Parameters in the order of the model, then starts, offsets and lateness recording by recording."""
     unknowns = []
@@ -265,7 +266,7 @@ def _unknowns(
             )  # the others keep the common value
             unknowns += [_parameter(name, r, p, priors.get(name), None) for r in own]
         else:
-            believed = belief if name not in priors and p.value > 0 and p.min >= 0 else None
+            believed = belief.get(name) if name not in priors and p.value > 0 and p.min >= 0 else None
             unknowns.append(_parameter(name, None, p, priors.get(name), believed))
     for system in systems:
         unknowns += [

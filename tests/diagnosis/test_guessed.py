@@ -38,8 +38,10 @@ def test_guesses_are_hardly_believed() -> None:
 
 def test_a_guess_keeps_what_the_readings_leave_open() -> None:
     """A processor: nothing spoke against a sink of 1e8 J/K, guessed as 100, but for the start value."""
-    width = context_of(campaign(simulated(1)), replace(model(), guessed=True)).belief
-    assert np.exp(width) == pytest.approx(9.0)
+    believed = context_of(campaign(simulated(1)), replace(model(), guessed=True)).belief
+    assert {name: np.exp(width) for name, width in believed.items()} == pytest.approx(
+        dict.fromkeys(model().free, 9.0)
+    )
 
 
 def test_a_file_says_so(tmp_path: Path) -> None:
