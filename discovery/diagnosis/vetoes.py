@@ -20,7 +20,7 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis, _: Added) -
     offset that is another one in every recording is no offset.
     """
     is_clock = h.effect.place == "inputs of a recording"
-    is_offset = h.effect.place == "input temperature" and len(context.recordings) > 1
+    is_offset = h.effect.place == "input temperature"
     is_event = h.effect.search == "window" or (h.effect.is_event and h.effect.is_physics)
     if not is_clock and not is_offset and not is_event:
         return None
@@ -35,7 +35,7 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis, _: Added) -
             f"the clock of every recording would be shifted (readings {by}); a dead time between the inputs "
             "and the readings explains this as well"
         )
-    if is_offset:
+    if is_offset and len(context.recordings) > 1:
         return (
             f"{h.effect.word} at {h.where} would be another one in every recording; heat that the model "
             "leaves out explains this as well"
