@@ -70,7 +70,7 @@ def test_a_wrong_sensor_of_an_input_is_wrong_in_the_outputs_too() -> None:
         terms=tuple(replace(t, expression=substitute(t.expression, wrong)) for t in model.terms),
         outputs={name: substitute(y, wrong) for name, y in model.outputs.items()},
     )
-    found = predict(trajectory(h.added_to(model, {h.amplitudes[0]: 0.5})))
+    found = predict(trajectory(h.added_to(model, {h.amplitudes[0]: -0.5})))
     assert np.allclose(found, predict(trajectory(right)), rtol=0, atol=1e-9)
     assert not np.allclose(found, predict(trajectory(model)), rtol=0, atol=0.1)
 
