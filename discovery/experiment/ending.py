@@ -101,15 +101,17 @@ class Ending:
             return "verdict: no diagnosis ([mismatch] names no model)"
         effects = f": {', '.join(self.effects)}" if self.effects else ""
         ratio, but = self.diagnosed_ratio, ""
+        about = f" in {self.diagnosed}" if self.diagnosed and self.diagnosed != self.winner else ""
         if self.verdict == "no mismatch" and ratio is not None and ratio > _BETTER:
             but = (
                 f" in the recordings of the fit; but on the held-out ones {self.diagnosed} has "
                 f"{ratio:.0%} of the rms without a model"
             )
+            about = ""
         if self.repaired_ratio is not None and self.repaired_ratio > 1 / _BETTER:
             times = f"{self.repaired_ratio:.2f} times as large"
             but = f"; but the repair makes the rms on held-out recordings {times}"
-        return f"verdict: {self.verdict}{effects}{but}"
+        return f"verdict: {self.verdict}{about}{effects}{but}"
 
     def _doubts(self) -> str:
         worst_first = []
