@@ -73,13 +73,13 @@ def _stuck(recordings: Sequence[Seen], read: Sequence[Channel]) -> Iterator[Find
                 x, y = both[one.name]
                 values, counts = np.unique(y, return_counts=True)
                 value = float(values[np.argmax(counts)])
-                still = y == value
+                still = _longest(y == value) if b.between == "held" else y == value
                 known = still & _occurs(x, np.concatenate([o[0] for o in others]))
                 goes_on = float(np.std(x[known])) / (float(np.std(x)) or 1.0) if known.any() else 0.0
                 usual = max((_goes_on(o) for o in others), default=0.0)
                 moves = _answer(others) * float(np.std(x[known])) if known.any() else 0.0
                 digits = smallest_step(np.concatenate([o[1] for o in others]))
-                # what is set comes and goes, by steps of any size; a sensor moves by more than its digits
+                # what is set moves by steps of any size; a sensor moves by more than its digits
                 seen = b.between == "held" or (moves > _DIGITS * digits and _lasts(still))
                 if known.mean() > _STILL and goes_on > _GOES_ON and usual < 0.5 * goes_on and seen:
                     what = (
@@ -105,6 +105,15 @@ def _lasts(still: NDArray[np.bool_]) -> bool:
     """Whether a channel (N,) keeps its value once it has it; one with noise and few digits comes and goes."""
     before = still[:-1]
     return bool(before.any() and np.mean(still[1:][before]) > _KEEPS)
+
+
+def _longest(still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The longest of the times (N,) for which a channel keeps a value. What is set comes back to the same
+    values, what is frozen stays.
+    """
+    stretch = np.cumsum(np.diff(still, prepend=still[:1]))
+    counts = np.bincount(stretch, weights=still)
+    return np.asarray(still & (stretch == np.argmax(counts)))
 
 
 def _answer(others: Sequence[Array]) -> float:
