@@ -21,8 +21,7 @@ from discovery.printed import printed
 from discovery.recordings import Campaign
 
 SAID = 3.0  # standard errors beyond which what was found is said
-SMALL = 0.25  # of an interval, below which it is not
-LARGE = 0.5  # of an interval, likewise, where something else is missing
+SMALL = 0.25  # of an interval, below which it is not; twice as much where something else is missing
 
 
 def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough: float) -> dict[str, Grid]:
@@ -77,7 +76,7 @@ def sentences(fit: Fit, is_right: bool = True) -> list[str]:
     """
     found: dict[str, list[str]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
-        least = (SMALL if is_right else LARGE) * u.high if u.is_late else np.inf
+        least = (SMALL if is_right else 2 * SMALL) * u.high if u.is_late else np.inf
         if abs(value) > max(SAID * error, least):
             size = f"{abs(value):.0f}" if abs(value) >= 1 else printed(abs(value), 2)
             late = f"{size} s {'late' if value > 0 else 'early'} in {u.recording}"
