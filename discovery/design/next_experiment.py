@@ -9,18 +9,17 @@ from math import ceil
 import numpy as np
 from numpy.typing import NDArray
 
+from discovery.design.patterns import patterns
 from discovery.design.separation import separation
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.thresholds import BELIEF
-from discovery.dynamics import Trajectory, make_system, simulate
+from discovery.dynamics import Trajectory, make_system, simulate, start_values
 from discovery.dynamics.grid import Grid
 from discovery.dynamics.samples import Samples
 from discovery.errors import RunsAwayError
 from discovery.fitting import Noise
 from discovery.models import Model
-from discovery.models.units import same_dimension
 from discovery.printed import lasting
-from discovery.recordings import Channel
 from discovery.terms import Name
 
 Array = NDArray[np.float64]
@@ -65,9 +64,10 @@ def next_experiment(
     """
     length = min(LONGEST, max(float(g.time[-1] - g.time[0]) for g in context.grids.values()))
     results: list[tuple[Array, str, Trajectory, Trajectory]] = []
-    for text, inputs in _designs(context, length).items():
+    wanted = patterns(context, np.linspace(0.0, length, STEPS + 1))
+    for text, inputs in wanted.items():
         try:
-            a, b = _run(context, answer, inputs, length), _run(context, other, inputs, length)
+            a, b = (_run(context, model, inputs, length) for model in (answer, other))
         except RunsAwayError:
             continue
         results.append((separation(a, b, noise, known), text, a, b))
@@ -88,7 +88,8 @@ def next_experiment(
     every = length / READINGS
     times = ceil(DECISIVE / max(float(gained[-1]), 1e-9))
     if times > HOPELESS:
-        sentence = f"no input pattern of {lasting(length)} {purpose.does} with these outputs alone"
+        tried = f"{len(wanted)} input patterns of {lasting(length)}"
+        sentence = f"none of {tried} {purpose.does} with these outputs alone"
     elif times > 1:
         often = f"{times} recordings of {lasting(length)}, readings every {lasting(every)}"
         sentence = f"{text}: {purpose.does} with {often}"
@@ -108,77 +109,6 @@ def _read(context: Context) -> set[str]:
     return {y.id for y in shown.values() if isinstance(y, Name)}
 
 
-def _designs(context: Context, length: float) -> dict[str, Mapping[str, Array]]:
-    """Patterns in words, each input at the instants of the pattern: of what this machine has to be moved."""
-    time = np.linspace(0.0, length, STEPS + 1)
-    channels = context.campaign.channels
-    series = {
-        n: np.concatenate([context.grids[r].samples[n].value for r in context.recordings])
-        for n in context.grids[context.recordings[0]].samples
-    }
-    roles = {n: channels[n].role for n in series}
-    wet = {"fluid flow", "fluid temperature"} <= set(roles.values())  # else what flows is a coolant
-
-    def build(speed: Array, load: Array, pump: Array, warm: bool) -> dict[str, Array]:
-        share = {
-            "rotation speed": speed,
-            "heat load": load,
-            "cooling power": load,
-            "fluid flow": pump if wet else np.ones(len(time)),
-            "fluid temperature": np.ones(len(time)) if warm else None,
-        }
-        out = {}
-        for n, role in roles.items():
-            moved = share.get(role)
-            level = np.quantile(series[n], 0.95) if moved is not None else np.median(series[n])
-            out[n] = level * (np.ones(len(time)) if moved is None else moved)
-        return out
-
-    zero, one, first = np.zeros(len(time)), np.ones(len(time)), (time < length / 2).astype(float)
-    sixth, twelfth = (((time // (length / n)) % 2 == 0).astype(float) for n in (6, 12))
-    speed, load = (r in roles.values() for r in ("rotation speed", "heat load"))
-
-    def called(role: str, word: str) -> str:
-        """The only channel of a role by its name, several by a word."""
-        mine = [n for n, one in roles.items() if one == role]
-        return mine[0] if len(mine) == 1 else word
-
-    names = called("rotation speed", "speed"), called("heat load", "load")
-    moving = " and ".join(name for name, there in zip(names, (speed, load), strict=True) if there)
-    dry, still = ", dry" if wet else "", "stand still" if speed else "leave everything off"
-    half, two, hour = (lasting(length / n) for n in (2, 6, 12))
-    wanted: dict[str, Mapping[str, Array]] = {}
-    if wet:
-        wanted[f"switch the pump every {two} at standstill with warm fluid"] = build(zero, zero, sixth, True)
-    if wet and moving:
-        wanted[f"switch the pump every {two} at full {moving}"] = build(one, one, sixth, False)
-        wanted[f"step {moving} every {hour} with the pump running"] = build(twelfth, twelfth, one, False)
-    if moving:
-        wanted[f"run {half} at full {moving}{dry}, then {still} for {half}"] = build(
-            first, first, zero, False
-        )
-        wanted[f"step {moving} every {hour}{dry}"] = build(twelfth, twelfth, zero, False)
-    if speed and load:
-        wanted[f"run at half {names[0]} and full {names[1]}{dry}"] = build(0.5 * one, one, zero, False)
-    wanted[f"{still} and follow the room"] = build(zero, zero, zero, False)
-    stepped = ("other input",) if wet else ("other input", "fluid flow")  # a coolant never stays off
-    for n in (n for n, role in roles.items() if role in stepped and _is_set(channels[n])):
-        low, high = np.quantile(series[n], (0.05, 0.95))
-        if high > low:
-            wanted[f"step {n} every {hour}{dry}"] = {
-                **build(zero, zero, zero, False),
-                n: low + (high - low) * twelfth,
-            }
-    return wanted
-
-
-def _is_set(channel: Channel) -> bool:
-    """Whether somebody sets an input: it stays until it is set anew. What moves in between, as a temperature,
-    is only measured, and nobody steps the sun.
-    """
-    return channel.between == "held" and not same_dimension(channel.unit, "W/m**2")
-
-
 def _run(context: Context, model: Model, inputs: Mapping[str, Array], length: float) -> Trajectory:
     """Return a run of a model under a pattern of inputs. It starts as the first recording did."""
     time = np.linspace(0.0, length, STEPS + 1)
@@ -187,7 +117,8 @@ def _run(context: Context, model: Model, inputs: Mapping[str, Array], length: fl
     }
     read = np.arange(0, STEPS + 1, STEPS // READINGS)
     readings = np.full((len(read), len(context.outputs)), np.nan)
-    known = context.grids[context.recordings[0]].readings
-    readings[0] = [next((v for v in column if np.isfinite(v)), np.nan) for column in known.T]
+    begun = make_system(model, context.grids[context.recordings[0]])
+    readings[0] = [next((v for v in column if np.isfinite(v)), np.nan) for column in begun.grid.readings.T]
     grid = Grid("next experiment", time, samples, context.outputs, read, readings)
-    return simulate(make_system(model, grid), model.values(grid.recording))
+    values = model.values(grid.recording)
+    return simulate(make_system(model, grid), values, start_values(begun, values))

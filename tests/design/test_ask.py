@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from discovery.design import question
-from discovery.design.next_experiment import STEPS, _designs, believed, next_experiment
+from discovery.design.next_experiment import STEPS, believed, next_experiment
+from discovery.design.patterns import patterns
 from discovery.design.question import (
     APART,
     CONFIRM,
@@ -149,7 +150,7 @@ def test_a_pattern_confirms_an_effect_where_it_acts_and_takes_its_time() -> None
     assert minutes
     assert 5.5 <= float(minutes[1]) < 8.0
     assert "within about 8.3 s" in next_experiment(where, more, fitted, noise, CONFIRM)
-    assert "no input pattern" in next_experiment(where, more, fitted, noise, CONFIRM, believed(where))
+    assert "input patterns of" in next_experiment(where, more, fitted, noise, CONFIRM, believed(where))
 
 
 def test_an_input_of_no_known_role_is_moved_where_it_is_what_acts() -> None:
@@ -274,7 +275,8 @@ def test_patterns_move_what_the_machine_has() -> None:
     seen = campaign(simulated(1))
     grids = {"r1": make_grid(seen, "r1", machine.INPUTS, list(SEEN))}
     where = cast(Context, SimpleNamespace(campaign=seen, grids=grids, recordings=("r1",)))
-    found, time = _designs(where, 43200.0), np.linspace(0.0, 43200.0, STEPS + 1)
+    time = np.linspace(0.0, 43200.0, STEPS + 1)
+    found = patterns(where, time)
     high = np.quantile(grids["r1"].samples["speed"].value, 0.95)
     half = found["run 6 h at full speed and P_drive, dry, then stand still for 6 h"]
     assert np.array_equal(half["speed"], np.where(time < 21600.0, high, 0.0))
@@ -302,7 +304,7 @@ def test_a_coolant_is_stepped_but_never_stays_off() -> None:
             recordings=("r1",),
         ),
     )
-    found = _designs(where, 43200.0)
+    found = patterns(where, np.linspace(0.0, 43200.0, STEPS + 1))
     assert "step pump every 1 h" in found
     assert not [words for words in found if "dry" in words or "switch" in words]
     kept = [inputs["pump"] for words, inputs in found.items() if "step pump" not in words]
@@ -323,7 +325,31 @@ def test_what_is_only_measured_is_not_stepped() -> None:
                 recordings=("r1",),
             ),
         )
-        assert any(words.startswith("step pump") for words in _designs(where, 43200.0)) == there
+        found = patterns(where, np.linspace(0.0, 43200.0, STEPS + 1))
+        assert any(words.startswith("step pump") for words in found) == there
+
+
+def test_an_input_is_stepped_alone_while_everything_else_is_on() -> None:
+    """What a speed does besides its power shows at constant power alone; a pump is off and on."""
+    seen = campaign(simulated(1))
+    grids = {"r1": make_grid(seen, "r1", machine.INPUTS, list(SEEN))}
+    where = cast(Context, SimpleNamespace(campaign=seen, grids=grids, recordings=("r1",)))
+    found = patterns(where, np.linspace(0.0, 43200.0, STEPS + 1))
+    ((_, speed),) = ((words, one) for words, one in found.items() if words.startswith("step speed between"))
+    assert np.ptp(speed["P_drive"]) == 0.0 < np.ptp(speed["speed"])
+    assert speed["speed"].min() > 0.0 < speed["P_drive"].min()
+    assert "step pump between 0 and 1 every 1 h, everything else on" in found
+
+
+def test_what_is_not_moved_stays_as_it_was_when_the_machine_was_read_first() -> None:
+    """From 17 degC on in a room that is 20 degC elsewhere, a machine would seem to warm by itself."""
+    cold = ten_minutes()
+    one = cold.recordings["a"]
+    room = np.where(one.time < 100.0, 17.0, 20.0)
+    runs = replace(cold, recordings={"a": replace(one, values={**one.values, "T_env": room})})
+    where = context_of(runs, plate(0.04), outputs=["T"])
+    for inputs in patterns(where, np.linspace(0.0, 600.0, STEPS + 1)).values():
+        assert np.all(inputs["T_env"] == 17.0)
 
 
 def test_what_is_measured_already_is_asked_before_a_new_experiment() -> None:
