@@ -156,7 +156,9 @@ def _smallest(found: Search) -> str:
         size, c = max(((_visible(c), c) for c in seen), key=lambda item: item[0])
         h = c.hypothesis
         speed = f" at {h.effect.at}" if h.effect.at else ""
-        places = list(dict.fromkeys(" and ".join(c.hypothesis.places) for c in seen))
+        alone = {c.hypothesis.places for c in seen if len(c.hypothesis.places) == 1}
+        each = [p for c in seen if (p := c.hypothesis.places) in alone or not {(one,) for one in p} <= alone]
+        places = list(dict.fromkeys(map(" and ".join, each)))  # those of a group are there each
         everywhere = len(seen) == len(claims) and len(places) > 1 and h.effect.place in _ANYWHERE
         where = _ANYWHERE[h.effect.place] if everywhere else f"at {'; '.join(places)}"
         unit = h.units.get(h.amplitudes[0], "1")

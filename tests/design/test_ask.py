@@ -270,6 +270,18 @@ def test_a_size_without_a_unit_is_a_share() -> None:
     assert "second_thermal_mass" not in _smallest(cast(Search, SimpleNamespace(claims=[blind])))
 
 
+def test_a_group_is_not_said_again_where_each_of_its_bodies_is() -> None:
+    motor, table, bed = machine.claims(model(), "friction_speed")
+    both = replace(motor, states=("motor", "table"))
+    unseen = Score(bed, 0.0, 0.0, (9.0,), 1.0, 0)
+    for shown, where in (
+        ((motor, table, both), "at motor; table"),
+        ((motor, both), "at motor; motor and table"),
+    ):
+        claims = [*(Score(h, 0.0, 2.0, (9.0,), 1.0, 0) for h in shown), unseen]
+        assert _smallest(cast(Search, SimpleNamespace(claims=claims))).endswith(where)
+
+
 def test_patterns_move_what_the_machine_has() -> None:
     """Half of the time at full speed and load; steps of a twelfth; the pump by a sixth, and dry elsewhere."""
     seen = campaign(simulated(1))
