@@ -89,7 +89,10 @@ def sentences(fit: Fit, noise: Noise) -> list[str]:
     if not noise.rough:
         return []
     noisy = {name for run in fit.trajectories for name in run.system.grid.noisy}
-    allowed = "is recorded with noise that the outputs do not follow; the diagnosis allows for it"
+    allowed = (
+        "jumps from sample to sample by more than the outputs show: noise of its recording, or too quick for "
+        "the bodies; the diagnosis allows for it"
+    )
     return [f"{name} {allowed}" for name in fit.model.inputs if name in noisy]
 
 
