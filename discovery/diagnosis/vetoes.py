@@ -16,8 +16,8 @@ Veto = Callable[[Context, Scored, Hypothesis, Added], str | None]
 
 
 def every_recording(context: Context, answer: Scored, h: Hypothesis, _: Added) -> str | None:
-    """What every recording shows is no event: unrecorded heat for some hours, or a clock that is wrong. An
-    offset that is another one in every recording is no offset.
+    """What every recording shows is no event: a clock that is wrong, or, where most show it, unrecorded heat
+    for some hours. An offset that is another one in every recording is no offset.
     """
     is_clock = h.effect.place == "inputs of a recording"
     is_offset = h.effect.place == "input temperature"
@@ -25,7 +25,9 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis, _: Added) -
     if not is_clock and not is_offset and not is_event:
         return None
     alike = _alike(answer, h)
-    if h.recording is not None and not {o.recording for o in alike} >= set(context.recordings):
+    every = set(context.recordings)
+    runs = every if h.recording is None else {o.recording for o in alike if o.recording is not None}
+    if not (2 * len(runs) > len(every) if is_event else runs >= every):
         return None
     if is_clock:
         late = {run: _shift(answer, alike, run) for run in context.recordings}
@@ -41,9 +43,10 @@ def every_recording(context: Context, answer: Scored, h: Hypothesis, _: Added) -
             "leaves out explains this as well"
         )
     if len(context.recordings) > 1:
+        often = "every recording" if runs >= every else f"{len(runs)} of {len(every)} recordings"
         return (
-            f"{h.effect.word} at {h.where} would come in every recording; a law that the model leaves out "
-            "explains this as well"
+            f"{h.effect.word} at {h.where} would come in {often}; a law that the model leaves out explains "
+            "this as well"
         )
     return (
         f"with a single recording to fit, {h.effect.word} at {h.where} cannot be distinguished from a law "

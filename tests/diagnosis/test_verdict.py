@@ -724,6 +724,12 @@ def test_effects_that_improve_free_runs_only_together_are_no_nothing(monkeypatch
             {"unmeasured_heat": 0.98},
             "would come in every recording",
         ),
+        (
+            [Model(tuple(claim("unmeasured_heat", recording=r) for r in ("r1", "r2")), 50.0)],
+            World(("r1", "r2", "r3")),
+            {"unmeasured_heat": 0.98},
+            "would come in 2 of 3 recordings",
+        ),
         ([Model((OFFSET,), 50.0, off=0.24)], World(), {"sensor_offset": 0.98}, "wrong by about 24 %"),
         (
             [Model((*(claim("unmeasured_heat", recording=r) for r in ("r1", "r2")), OFFSET), 90.0)],
