@@ -66,13 +66,18 @@ def test_a_run_ends_in_five_lines(folder: Path) -> None:
             "verdict: no mismatch in the recordings of the fit; but on the held-out ones first_order "
             "has 217% of the rms without a model",
         ),
-        ("no mismatch", 0.3, "verdict: no mismatch"),
-        ("unexplained", 2.17, "verdict: unexplained"),
+        ("no mismatch", 0.3, "verdict: no mismatch in first_order"),
+        ("unexplained", 2.17, "verdict: unexplained in first_order"),
     ],
 )
 def test_a_verdict_is_not_said_of_recordings_that_refute_it(verdict: str, share: float, said: str) -> None:
     end = ended(verdict=verdict, diagnosed="first_order", diagnosed_ratio=share)
     assert end.lines()[2] == said
+
+
+def test_a_verdict_says_of_which_model_it_speaks_if_another_one_wins() -> None:
+    for winner, said in (("a", "verdict: unexplained in b"), ("b", "verdict: unexplained")):
+        assert ended(verdict="unexplained", diagnosed="b", winner=winner).lines()[2] == said
 
 
 def ended(**said: Any) -> Ending:
