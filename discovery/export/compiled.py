@@ -7,13 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from discovery.errors import UserError
-from discovery.export.differentiate import Node, compile_expression
+from discovery.export.differentiate import Memory, Node, compile_expression
 from discovery.export.program import Builder, Program
 from discovery.models import Model, expanded
-from discovery.terms import Apply, Expression, Name, Term, names, text
+from discovery.terms import Apply, Expression, Name, Term, degree, names, text
 from discovery.terms.expression import rewrite
 
 MAX_DELAY_STEPS = 20_000  # a controller keeps every one of them
+_ROUNDS = 8  # of Newton towards a balance that is not linear
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,9 @@ def compile_model(model: Model, step_s: float) -> Compiled:
 def _start_program(
     model: Model, build: Builder, fed: Mapping[str, Node], rest: _AtStart, plays: Sequence[Apply]
 ) -> Program:
-    """Start values of the states from channels and parameters, plays at rest."""
+    """Start values of the states from channels and parameters, or in the balance of their terms; plays at
+    rest.
+    """
     zero = Node(build.constant(0.0))
     known = {**dict.fromkeys(model.states, zero), **fed, "time": zero}
     first = {
@@ -160,13 +163,56 @@ def _start_program(
         else zero
         for name, state in model.states.items()
     }
+    free = [name for name, state in model.states.items() if state.start is None]
+    affine = all(degree(term.expression, frozenset(free)) <= 1 for term in model.terms)
+    for _ in range((1 if affine else _ROUNDS) if free else 0):
+        first |= _nearer_to_balance(model, build, {**known, **first}, rest, free)
     known |= first
     at_rest = [compile_expression(build, apply, known, rest).value for apply in plays]
     return build.program([*(node.value for node in first.values()), *at_rest])
 
 
+def _nearer_to_balance(
+    model: Model, build: Builder, known: Mapping[str, Node], rest: _AtStart, free: Sequence[str]
+) -> dict[str, Node]:
+    """Some states after a step of Newton towards the balance of their terms."""
+    one = build.constant(1.0)
+    rates, slopes, _ = _rates(
+        model, build, {**known, **{name: Node(known[name].value, {name: one}) for name in free}}, rest
+    )
+    index = [list(model.states).index(name) for name in free]
+    zero = build.constant(0.0)
+    matrix = [[slopes.get((i, j), zero) for j in index] for i in index]
+    change = _solution(build, matrix, [rates[i] for i in index])
+    return {
+        name: Node(build.apply("-", known[name].value, by)) for name, by in zip(free, change, strict=True)
+    }
+
+
+def _solution(build: Builder, matrix: list[list[int]], right: list[int]) -> list[int]:
+    """The solution of matrix x = right by elimination. What leaves a body grows with its own temperature more
+    than with any other, so no rows are exchanged; what does not move with itself (an integral) stays.
+    """
+    apply, zero, one = build.apply, build.constant(0.0), build.constant(1.0)
+    inverse = []
+    for k, row in enumerate(matrix):
+        none = apply("==", row[k], zero)
+        inverse.append(apply("select", none, zero, apply("/", one, apply("select", none, one, row[k]))))
+        for below in range(k + 1, len(matrix)):
+            factor = apply("*", matrix[below][k], inverse[k])
+            matrix[below] = [
+                apply("-", a, apply("*", factor, b)) for a, b in zip(matrix[below], row, strict=True)
+            ]
+            right[below] = apply("-", right[below], apply("*", factor, right[k]))
+    found: list[int] = [zero] * len(matrix)
+    for k in reversed(range(len(matrix))):
+        others = build.sum([apply("*", matrix[k][c], found[c]) for c in range(k + 1, len(matrix))])
+        found[k] = apply("*", apply("-", right[k], others), inverse[k])
+    return found
+
+
 def _rates(
-    model: Model, build: Builder, env: Mapping[str, Node], running: _Running
+    model: Model, build: Builder, env: Mapping[str, Node], running: Memory
 ) -> tuple[list[int], dict[tuple[int, int], int], list[tuple[int, str]]]:
     """dx/dt of each state, the nonzeros of their Jacobian by row and column, and a note on each term."""
     nodes = [compile_expression(build, term.expression, env, running) for term in model.terms]

@@ -290,13 +290,15 @@ def expanded(model: Model, channels: Collection[str] = ()) -> Model:
 
 
 def with_settled_memories(model: Model) -> Model:
-    """An expanded model whose memories start with what they are fed with, as expressions: what has no solver
-    for balances (a controller) starts there, too.
+    """An expanded model whose memories start with what they are fed with, as expressions, unless they follow
+    a state that begins in balance.
     """
     states, fed = dict(model.states), _fed_with(model)
     for name in [n for n in states if n in fed and states[n].start is None]:
         starts = {s: state.start for s, state in states.items() if state.start is not None}
-        states[name] = replace(states[name], start=rewrite(substitute(fed[name], starts), _settled))
+        start = rewrite(substitute(fed[name], starts), _settled)
+        if not names(start) & {s for s, state in states.items() if state.start is None}:
+            states[name] = replace(states[name], start=start)
     return replace(model, states=states)
 
 
