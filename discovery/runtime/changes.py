@@ -186,8 +186,9 @@ class Table:
         gram = every.T @ every
         inverse = np.linalg.inv(gram[1:, 1:] + np.eye(len(gram) - 1))
         grown = wear.share * wear.root
-        during_by = grown @ (inverse @ gram[1:, 0])[-count:]
-        during_sd = np.sqrt(np.einsum("ij,jk,ik->i", grown, inverse[-count:, -count:], grown))
+        last = slice(len(inverse) - count, None)  # none, where nothing of the model can wear
+        during_by = grown @ (inverse @ gram[1:, 0])[last]
+        during_sd = np.sqrt(np.einsum("ij,jk,ik->i", grown, inverse[last, last], grown))
         gram = _without(gram, 1 + kept)
         covariance = np.linalg.inv(gram[1:, 1:] + np.eye(kept))
         mine = before[new]

@@ -116,7 +116,7 @@ def _calm(change: Change) -> str:
     return {
         "COLD": "the model starts without a saved state",
         "WARM": "the model went through a gap",
-    }.get(change.after, "the model has settled")
+    }.get(change.after, "the settling time is over")
 
 
 def said(spec: Input, value: object) -> str:

@@ -197,6 +197,15 @@ def test_odds_are_those_of_the_joint_gaussian() -> None:
         assert covariance == pytest.approx(root @ root.T - gain @ j @ root.T)
 
 
+def test_where_nothing_can_wear_nothing_has() -> None:
+    """A model of errors without a heat or an exchange: its update ended in a traceback."""
+    rng = np.random.default_rng(6)
+    natural = rng.normal(size=(20, 3))
+    table = Table(rng.normal(size=20), natural, np.zeros((20, 2)), {}, {}, np.ones(3), 12, 3)
+    found = table.followed(Wear(np.arange(1), np.arange(1, 2), np.zeros((1, 0))))
+    assert found.by == pytest.approx(np.zeros(1))
+
+
 def test_what_is_known_after_wear_is_the_joint_gaussian() -> None:
     """Rows for the next comparison, against dense covariances: parameters p of the fit, p + a at the end."""
     rng = np.random.default_rng(5)
