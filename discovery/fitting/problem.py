@@ -30,7 +30,6 @@ from discovery.recordings import Campaign
 Array = NDArray[np.float64]
 
 FORMER = 2  # recordings as which the spread of starts that was believed before counts
-LATE = 0.5  # of a logging interval, within which an input is logged late (68 %), and never more than a whole
 FARTHEST = 1e6  # times its start that a parameter may go: no recording shows more, and the arithmetic fails
 UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
 
@@ -284,7 +283,7 @@ def _unknowns(
             for how in _zero_spread(n in system.grid.outputs)
         ]
         unknowns += [
-            Unknown(n, system.grid.recording, False, 0.0, -most, most, (0.0, LATE * most), is_late=True)
+            Unknown(n, system.grid.recording, False, 0.0, -most, most, (0.0, most), is_late=True)
             for n, most in system.grid.unsure.items()
             if n in system.model.inputs
         ]
