@@ -111,15 +111,25 @@ def from_known_starts(
         known: inputs whose offsets are known in this recording.
         together: readings that count as one, as in the fit (`Fit.together`).
         reading: (Y,) reading noise, within which a start is known that was read; default `white`.
-        farthest: spreads by which a start or an input may be off. A room that is known within 3 K is not 35 K
-            colder, however much better a wrong model looks with it.
+        farthest: spreads by which an input, or a start that was read, may be off. A room that is known
+            within 3 K is not 35 K colder, however much better a wrong model looks with it. A machine may
+            begin warmer than in any other recording, a probe at another zero, and what each recording has
+            of its own may be anything.
     """
     unsure = _unsure(run.system, white if reading is None else reading, known)
     if not (any(unsure) or run.system.grid.silent or run.system.delays) or not len(residual):
         return residual
     parts = _moved(run, unsure), moved_in_gaps(run)
     spread, moved = (np.concatenate(both, axis=-1) for both in zip(*parts, strict=True))
-    return residual - moved @ _shift(residual, white, spread, moved, together, farthest)
+    states = run.system.model.states
+    anywhere = [
+        *(name in run.system.grid.outputs for name in unsure.inputs),
+        *(True for _ in unsure.own),
+        *(not states[name].read_as for name in unsure.starts),
+    ]
+    ends = farthest * spread
+    ends[np.flatnonzero(anywhere)] = inf
+    return residual - moved @ _shift(residual, white, spread, moved, together, ends)
 
 
 def innovations_from_known_starts(run: Trajectory, residual: Array, noise: Noise) -> Array:
@@ -171,20 +181,20 @@ def _shift(
     spread: Array,
     moved: Array,
     together: float = 1.0,
-    farthest: float = inf,
+    ends: Array | float = inf,
 ) -> Array:
-    """Most likely shifts (K,) of what is not known, given the first rows of a residual (N, Y). None is larger
-    than so many spreads.
+    """Most likely shifts (K,) of what is not known, given the first rows of a residual (N, Y).
 
     Args:
         spread, moved: as of `_moved`.
+        ends: (K,) the largest shifts.
     """
     seen = np.isfinite(residual)
     c = (moved[: len(residual)] / white[None, :, None])[seen]
     gram = c.T @ c / together + np.diag(1 / spread**2)
     slope = -c.T @ (residual / white)[seen] / together
-    ends = farthest * spread
-    return bounded_step(np.zeros(len(spread)), gram, slope, 0.0, -ends, ends)
+    most = np.broadcast_to(ends, spread.shape)
+    return bounded_step(np.zeros(len(spread)), gram, slope, 0.0, -most, most)
 
 
 def _moved(run: Trajectory, unsure: Unsure) -> tuple[Array, Array]:
