@@ -160,7 +160,8 @@ class Shape:
     factor: float = 0.0
     spread: float = 0.0
     instant: bool = False
-    least: float = 0.0  # what the recordings can show of a time constant
+    least: float = 0.0  # what the recordings can show of a time constant, ...
+    most: float = inf  # ... and what they cannot tell from a drift
     apart: float = 3.0
     is_shift: bool = False
     or_at_once: bool = False
@@ -172,7 +173,7 @@ class Shape:
                 return replace(self, spread=min(self.spread, _SHIFTED * longest))
             return replace(self, middle=min(self.middle, _SHIFTED * longest)) if self.is_shift else self
         middle, factor = sqrt(shortest * longest), (longest / shortest) ** (0.5 / _REACH)
-        return replace(self, middle=middle, factor=factor, least=middle * factor**-_REACH)
+        return replace(self, middle=middle, factor=factor, least=shortest, most=longest)
 
     @property
     def values(self) -> tuple[tuple[float, float], ...]:
@@ -196,7 +197,8 @@ class Shape:
             return 0.0, inf
         if not self.factor:
             return self.middle - FARTHEST * self.spread, self.middle + FARTHEST * self.spread
-        return max(self.least, self.middle * self.factor**-FARTHEST), self.middle * self.factor**FARTHEST
+        lowest, highest = (self.middle * self.factor**z for z in (-FARTHEST, FARTHEST))
+        return max(self.least, lowest), min(self.most, highest)
 
 
 @dataclass(frozen=True)
