@@ -82,7 +82,7 @@ def check_the_device(context: Context, named: Sequence[Hypothesis]) -> str:
 
 def _not_used(context: Context) -> str:
     """What is recorded already and could act: inputs that no term of the model uses."""
-    unused = ", ".join(sorted(context.scene.unused))
+    unused = ", ".join(sorted(context.scene.unused & context.scene.largest.keys()))  # of those that move
     return f"give the model what is recorded and it does not use ({unused}), and compare; " if unused else ""
 
 

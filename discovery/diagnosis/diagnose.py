@@ -375,7 +375,7 @@ def _reasons(
         said.append(
             f"the readings of {idle_readings} take no part: add them to the `outputs` of the experiment"
         )
-    if verdict.word != FAULT:  # there, they are part of the answer
+    if verdict.named or verdict.word != FAULT:  # else they are the answer
         said += _set_aside(context)
     said += sentences(verdict.answer)
     said += not_offered(context.model, context.scene, effects)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -194,13 +195,18 @@ def test_what_has_no_answer_is_not_confirmed() -> None:
     assert aim([law], None, answered=True).does == "would confirm the answer"
 
 
+def scene(unused: Collection[str]) -> SimpleNamespace:
+    """Inputs that a model does not use; ice is never there."""
+    return SimpleNamespace(unused=frozenset(unused), largest={"fan": 1.0, "current": 5.0})
+
+
 def test_what_is_recorded_and_not_used_is_asked_for_before_more_is_recorded() -> None:
     nothing = cast(Verdict, SimpleNamespace(word=UNEXPLAINED, named=(), candidates=()))
     for unused, first in (
-        (frozenset({"fan"}), "give the model what is recorded and it does not use (fan)"),
-        (frozenset(), NOTHING_CLOSE),
+        ({"fan", "ice"}, "give the model what is recorded and it does not use (fan)"),
+        ({"ice"}, NOTHING_CLOSE),
     ):
-        where = cast(Context, SimpleNamespace(scene=SimpleNamespace(unused=unused), unused_readings=[]))
+        where = cast(Context, SimpleNamespace(scene=scene(unused), unused_readings=[]))
         said = ask(where, cast(Search, None), nothing)
         assert said.startswith(first)
         assert said.endswith(NOTHING_CLOSE)
@@ -212,7 +218,7 @@ def test_what_is_not_used_is_asked_for_also_where_something_came_close(
     """A cell without its current: the lag of its thermometer came closest."""
     near = SimpleNamespace(hypothesis=SimpleNamespace(recording="r1"), rivals=())
     close = cast(Verdict, SimpleNamespace(word=UNEXPLAINED, named=(), candidates=(near,), answer=None))
-    where = cast(Context, SimpleNamespace(scene=SimpleNamespace(unused={"current"}), unused_readings=[]))
+    where = cast(Context, SimpleNamespace(scene=scene({"current"}), unused_readings=[]))
     monkeypatch.setattr(question, "look_back", lambda *_: "look at r1")
     said = ask(where, cast(Search, None), close)
     assert said == "give the model what is recorded and it does not use (current), and compare; look at r1"
