@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
+from scipy.optimize import fsolve
 
 from discovery.errors import UserError
 from discovery.export.agreement import agreement
@@ -44,6 +45,41 @@ def test_linear_models_are_exact_however_stiff(gain: float) -> None:
         assert y is not None
         np.testing.assert_allclose(stepper.x, x, rtol=1e-11, atol=1e-11)
         assert y[0] == pytest.approx(x[0] + 2 * x[1] - x[2], abs=1e-10)
+
+
+def _tunnel(law: str, sky: str = "5.67e-8*((air + 273.15)**4 - (deep + 273.15)**4)") -> Model:
+    """Two layers that nobody reads, between a body that begins where the canopy is and a cellar."""
+    states = {
+        "top": State("top", "degC", 2e4, parse("canopy"), 0.0, 5e-5),
+        "mid": State("mid", "degC", 9e4, None, None, 1 / 9e4),
+        "deep": State("deep", "degC", 3e5, None, None, 1 / 3e5),
+        "sum": State("sum", "degC", None, None, None, 1.0),
+    }
+    terms = (
+        Term("down", "mid", parse("G*(top - mid)"), "top"),
+        Term("deeper", "deep", parse(f"{law}*(mid - deep)"), "mid"),
+        Term("cellar", "deep", parse("2*(11 - deep)")),
+        Term("sky", "deep", parse(sky)),
+        Term("all that came", "sum", parse("air")),
+    )
+    return Model("tunnel", {"G": Parameter(6.0)}, states, terms, {"y": parse("deep - top")})
+
+
+@pytest.mark.parametrize("law", ["3", "3*abs(mid - deep + 0.1)**0.25"])
+def test_what_nobody_reads_begins_in_the_balance_of_its_terms(law: str) -> None:
+    """Against the root of scipy; what has no balance, an integral, begins at zero."""
+    stepper = Stepper(compile_model(_tunnel(law), 10.0))
+    assert stepper.compiled.inputs == ("air", "canopy")
+    stepper.start(np.array([4.0, 31.0]))
+
+    def net(x: np.ndarray) -> list[float]:
+        mid, deep = x
+        down = (3.0 if law == "3" else 3.0 * abs(mid - deep + 0.1) ** 0.25) * (mid - deep)
+        sky = 5.67e-8 * (277.15**4 - (deep + 273.15) ** 4)
+        return [6.0 * (31.0 - mid) - down, down + 2.0 * (11.0 - deep) + sky]
+
+    mid, deep = fsolve(net, [20.0, 15.0], xtol=1e-13)
+    np.testing.assert_allclose(stepper.x, [31.0, mid, deep, 0.0], rtol=1e-9)
 
 
 def test_nonlinear_terms_converge_with_second_order() -> None:
