@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discovery.diagnosis.refit import refit
 from discovery.models import Model, Parameter, read_model, write_model
 from tests.diagnosis.parts import context_of
-from tests.machine import campaign, model, simulated
+from tests.machine import campaign, claims, model, simulated
 
 
 def far_off(guessed: bool) -> Model:
@@ -42,6 +43,16 @@ def test_a_guess_keeps_what_the_readings_leave_open() -> None:
     assert {name: np.exp(width) for name, width in believed.items()} == pytest.approx(
         dict.fromkeys(model().free, 9.0)
     )
+
+
+def test_the_size_of_an_effect_is_not_believed_to_be_where_a_search_begins() -> None:
+    """A tenth of usual: friction, which is never negative, was held near it by a second prior."""
+    context = context_of(campaign(simulated(1)), model())
+    (h,) = (one for one in claims(model(), "friction_speed") if one.states == ("motor",))
+    fit = refit(context, [h], context.usual)
+    believed = {u.name: u.belief for u in fit.problem.unknowns if not u.is_nuisance}
+    assert {name: believed[name] for name in model().free} == context.belief
+    assert [believed[name] for name in h.amplitudes] == [None]
 
 
 def test_a_file_says_so(tmp_path: Path) -> None:

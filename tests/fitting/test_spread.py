@@ -103,6 +103,24 @@ def test_an_unseen_run_takes_its_room_from_the_first_reading_alone() -> None:
     assert np.array_equal(run.x, again.x)
 
 
+def test_the_same_sensor_is_off_by_as_much_in_an_unseen_run() -> None:
+    """Three rooms that are 2 K warmer than recorded; of the fourth the first reading says nothing."""
+    rng = np.random.default_rng(9)
+    rooms = [cold(rng, name, 2.0) for name in ("r1", "r2", "r3", "new")]
+    seen = campaign(*rooms)
+    read = replace(model(), states={"T": State("T", "degC", scale=1.0)})  # it begins at its first reading
+    fit = fit_model(read, seen, ["r1", "r2", "r3"])
+    mean, spread = fit.zeros["room"]
+    assert 1.5 < mean < 2.0
+    assert spread < 1.0
+
+    def missed(zeros: dict[str, tuple[float, float]] | None) -> float:
+        run = predict_recording(fit.model, seen, "new", ["T"], [NOISE], zeros=zeros)
+        return float(np.sqrt(np.mean((run.system.grid.readings - predict(run))[-80:] ** 2)))
+
+    assert missed(fit.zeros) < 0.35 * missed(None)
+
+
 def test_without_a_spread_nothing_is_estimated() -> None:
     r = cold(np.random.default_rng(3), "r", 0.7)
     fit = fit_model(model(), campaign(r, spread=0.0), ["r"])

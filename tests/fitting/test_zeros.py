@@ -250,6 +250,25 @@ def test_a_room_that_is_known_within_a_spread_does_not_explain_what_is_far_beyon
         assert started[:, 0] == pytest.approx(-left * fall, abs=0.35)
 
 
+def test_a_machine_may_begin_warmer_than_in_any_other_recording() -> None:
+    """A body that nobody reads begins 8 K above a room from which it was never further than 1 K in a fit."""
+    hour: Array = 20.0 * np.arange(181.0)
+    states = {"body": State("body", "degC", None, parse("room"), 1.0, 1.0)}
+    model = Model(
+        "warm", {}, states, (Term("loss", "body", parse("(room - body)/1000")),), {"E": parse("3*body")}
+    )
+    channels = {
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "E": Channel("E", "error", "um", None, "linear"),
+    }
+    grown = 3.0 * (22.0 + 8.0 * np.exp(-hour / 1000.0))
+    readings = Recording("a", hour, {"room": np.full(181, 22.0), "E": grown})
+    run = predict_recording(model, Campaign("one", channels, {"a": readings}), "a", ["E"], [1e3])
+    residual = grown[:, None] - predict(run)
+    assert np.abs(residual).max() > 20.0
+    assert np.abs(from_known_starts(run, residual, np.array([0.1]), farthest=2.0)).max() < 0.1
+
+
 @pytest.mark.parametrize("recorded", [True, False])
 def test_what_an_input_did_in_a_gap_is_no_miss_of_a_model(recorded: bool) -> None:
     """A heater of 200 W that is on and off by the half hour: exact steps of a body of 10 kJ/K and 2 W/K. In a
