@@ -142,7 +142,7 @@ def refuted(
         if all(every[run].only_from_its_first_reading for run in worse):
             shown, check = " from the first reading alone", "how it began, and the inputs that are not sure"
         better = "better over all held-out recordings"
-        if len(worse) == len(every):  # each of them is better from other starts
+        if {*worse} >= {*proof}:  # each of them is better from other starts
             better = "better from each start within its spread (rms "
             better += ", ".join("{} -> {}".format(*map(printed, every[run].judged)) for run in worse) + ")"
         reason = (

@@ -960,6 +960,8 @@ def test_what_is_worse_from_the_first_reading_alone_is_told_so() -> None:
     assert kept.word == "missing physics"
     said_of_it = "better from each start within its spread (rms 4.5 -> 2.7), but worse on hold from the first"
     assert f"{said_of_it} reading alone: check how it began" in kept.reasons[-1]
+    asked = refuted(named, {"hold": start}, improved(2.0, 1.0, 0.5, 1.5))
+    assert said_of_it in asked.reasons[-1]
 
 
 def test_an_event_that_makes_unseen_recordings_worse_stands_for_something_else() -> None:
