@@ -2,7 +2,7 @@
 
 A logger that holds, averages or smooths its samples is late or early by up to about one of its intervals.
 This shift is an unknown of each recording, like the offset of an input with a spread. It is left out if a
-shift by a whole interval could not pass for an effect.
+shift by half an interval, which is usual, could not pass for an effect.
 
 A shift that differs from switch to switch is noise (`process_noise.py`).
 """
@@ -30,7 +30,7 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
 
     Args:
         fit: of the model, to some or all readings of the grids.
-        enough: log likelihood that a shift by a whole interval has to change, under the noise of readings
+        enough: log likelihood that a shift by half an interval has to change, under the noise of readings
             (as stated, or as rough as they are).
     """
     possible = {name: _possible(grid) for name, grid in grids.items()}
@@ -53,7 +53,7 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
         for k, u in enumerate(problem.unknowns):
             if u.is_late and u.recording == name:
                 interval = possible[name][u.name]
-                if 0.5 * float(np.nansum((jacobian[..., k] * interval) ** 2)) > enough:
+                if 0.5 * float(np.nansum((jacobian[..., k] * interval / 2) ** 2)) > enough:
                     shown[name][u.name] = interval
     return {name: replace(grid, unsure=shown[name]) for name, grid in grids.items()}
 
