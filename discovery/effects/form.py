@@ -173,7 +173,8 @@ class Shape:
                 return replace(self, spread=min(self.spread, _SHIFTED * longest))
             return replace(self, middle=min(self.middle, _SHIFTED * longest)) if self.is_shift else self
         middle, factor = sqrt(shortest * longest), (longest / shortest) ** (0.5 / _REACH)
-        return replace(self, middle=middle, factor=factor, least=shortest, most=longest)
+        least, most = (middle * factor**z for z in (-_REACH, _REACH))
+        return replace(self, middle=middle, factor=factor, least=least, most=most)
 
     @property
     def values(self) -> tuple[tuple[float, float], ...]:
