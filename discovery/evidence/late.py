@@ -1,8 +1,8 @@
 """Inputs that may be logged late: a switch some seconds before its stamp looks like missing heat.
 
 A logger that holds, averages or smooths its samples is late or early by up to about one of its intervals.
-This shift is an unknown of each recording, like the offset of an input with a spread. It is left out if a
-shift by half an interval, which is usual, could not pass for an effect.
+This shift is an unknown of each recording, like the offset of an input with a spread. It is left out if
+readings are rarer than the samples, or if a shift by a whole interval could not pass for an effect.
 
 A shift that differs from switch to switch is noise (`process_noise.py`).
 """
@@ -30,7 +30,7 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
 
     Args:
         fit: of the model, to some or all readings of the grids.
-        enough: log likelihood that a shift by half an interval has to change, under the noise of readings
+        enough: log likelihood that a shift by a whole interval has to change, under the noise of readings
             (as stated, or as rough as they are).
     """
     possible = {name: _possible(grid) for name, grid in grids.items()}
@@ -53,17 +53,19 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
         for k, u in enumerate(problem.unknowns):
             if u.is_late and u.recording == name:
                 interval = possible[name][u.name]
-                if 0.5 * float(np.nansum((jacobian[..., k] * interval / 2) ** 2)) > enough:
+                if 0.5 * float(np.nansum((jacobian[..., k] * interval) ** 2)) > enough:
                     shown[name][u.name] = interval
     return {name: replace(grid, unsure=shown[name]) for name, grid in grids.items()}
 
 
 def _possible(grid: Grid) -> dict[str, float]:
-    """Logging interval in s of each input that moves. What counts is what was recorded: means over blocks of
-    a coarsened grid follow a late stamp, too.
+    """Logging interval in s of each input that moves, where an output was read as often, but for readings
+    that are missing. What counts is what was recorded: means over blocks of a coarsened grid follow a late
+    stamp, too.
     """
+    spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=np.inf)
     moving = [n for n, one in grid.samples.items() if n in grid.logged and np.ptp(one.value) > 0]
-    return {n: grid.logged[n] for n in moving}
+    return {n: grid.logged[n] for n in moving if np.rint(spacing / grid.logged[n]) <= 1}
 
 
 def sentences(fit: Fit, is_right: bool = True) -> list[str]:
