@@ -21,7 +21,7 @@ from discovery.printed import printed
 from discovery.recordings import Campaign
 
 SAID = 3.0  # standard errors beyond which what was found is said
-SMALL = 0.25  # of an interval, below which it is not; twice as much where something else is missing
+SMALL = 0.25  # of an interval, below which it is not
 
 
 def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough: float) -> dict[str, Grid]:
@@ -72,11 +72,12 @@ def sentences(fit: Fit, is_right: bool = True) -> list[str]:
     """A sentence for each input that is logged late or early.
 
     Args:
-        is_right: whether nothing else is missing. If something is, the shift may stand for it.
+        is_right: whether nothing else is missing. If something is, the shift may stand for it, and is said
+            only where it is more than a logger makes.
     """
     found: dict[str, list[str]] = {}
     for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
-        least = (SMALL if is_right else 2 * SMALL) * u.high if u.is_late else np.inf
+        least = (SMALL if is_right else 1.0) * u.prior[1] if u.is_late and u.prior else np.inf
         if abs(value) > max(SAID * error, least):
             size = f"{abs(value):.0f}" if abs(value) >= 1 else printed(abs(value), 2)
             late = f"{size} s {'late' if value > 0 else 'early'} in {u.recording}"

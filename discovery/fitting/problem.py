@@ -30,6 +30,7 @@ from discovery.recordings import Campaign
 Array = NDArray[np.float64]
 
 FORMER = 2  # recordings as which the spread of starts that was believed before counts
+MOST = 2.0  # of what is expected, the most that an input is logged late
 FARTHEST = 1e6  # times its start that a parameter may go: no recording shows more, and the arithmetic fails
 UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
 
@@ -283,8 +284,8 @@ def _unknowns(
             for how in _zero_spread(n in system.grid.outputs)
         ]
         unknowns += [
-            Unknown(n, system.grid.recording, False, 0.0, -most, most, (0.0, most), is_late=True)
-            for n, most in system.grid.unsure.items()
+            Unknown(n, system.grid.recording, False, 0.0, -MOST * sd, MOST * sd, (0.0, sd), is_late=True)
+            for n, sd in system.grid.unsure.items()
             if n in system.model.inputs
         ]
     return unknowns

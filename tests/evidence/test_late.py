@@ -126,20 +126,19 @@ def test_what_may_stand_for_an_unknown_cause_is_said_otherwise(
 
 
 def test_a_shift_by_more_than_a_logger_makes_may_be_a_dead_time() -> None:
-    """A gas furnace with a dead time of two intervals, which its model lacks, kept silent about it. A logger
-    makes one at most.
-    """
-    late = [SimpleNamespace(name="gas", recording=r, is_late=True, high=9.0) for r in ("a", "b")]
+    """A gas furnace with a dead time of two intervals, which its model lacks, kept silent about it."""
+    prior = (0.0, 9.0)
+    late = [SimpleNamespace(name="gas", recording=r, is_late=True, prior=prior) for r in ("a", "b")]
     problem = SimpleNamespace(unknowns=late)
     fit: Any = SimpleNamespace(
-        problem=problem, theta=[-9.0, -4.0], standard_errors=[0.1, 0.1], trajectories=[None, None]
+        problem=problem, theta=[-18.0, -8.0], standard_errors=[0.1, 0.1], trajectories=[None, None]
     )
     assert sentences(fit, is_right=False) == [
-        "in the fit, gas is logged 9 s early in a: a dead time, or what the model leaves out, may look like "
+        "in the fit, gas is logged 18 s early in a: a dead time, or what the model leaves out, may look like "
         "this"
     ]
     assert sentences(fit) == [
-        "gas is logged 9 s early in a, 4 s early in b; the fit allows for it, and a dead time looks the same"
+        "gas is logged 18 s early in a, 8 s early in b; the fit allows for it, and a dead time looks the same"
     ]
 
 
