@@ -93,9 +93,17 @@ def recording_frame(campaign: Campaign, recording: str) -> pd.DataFrame:
 
 
 def prediction_frame(
-    model: Model, campaign: Campaign, recording: str, outputs: Sequence[str]
+    model: Model,
+    campaign: Campaign,
+    recording: str,
+    outputs: Sequence[str],
+    zeros: Mapping[str, tuple[float, float]] | None = None,
 ) -> pd.DataFrame:
     """Run a model freely on a recording.
+
+    Args:
+        zeros: what the fit of the model found of the zeros of outputs and of inputs known only within a
+            spread (`Fit.zeros`), as the table of a run has it; default nothing.
 
     Returns:
         A frame with the index time [s] of the readings. Each output NAME has three columns: the reading
@@ -110,7 +118,7 @@ def prediction_frame(
     from discovery.dynamics import predict
     from discovery.fitting import predict_recording
 
-    trajectory = predict_recording(model, campaign, recording, list(outputs))
+    trajectory = predict_recording(model, campaign, recording, list(outputs), zeros=zeros)
     grid, predicted = trajectory.system.grid, predict(trajectory)
     columns = {}
     for y, output in enumerate(outputs):

@@ -109,7 +109,13 @@ def test_a_run_shows_itself(tmp_path: Path) -> None:
     one = frame.query("recording == @HELD_OUT and model == 'first' and output == 'T1'").iloc[0]
     model = discovery.read_model(Path(results) / "models" / "first.toml")
     campaign = discovery.load_campaign(ROOT / "datasets" / "tclab", only=[HELD_OUT])
-    left = discovery.prediction_frame(model, campaign, HELD_OUT, OUTPUTS)["T1|left"]
+    fit = discovery.fit_model(
+        discovery.read_model(ROOT / "experiments" / "tclab_first_order.toml"),
+        discovery.load_campaign(ROOT / "datasets" / "tclab", only=[FIT]),
+        [FIT],
+        OUTPUTS,
+    )
+    left = discovery.prediction_frame(model, campaign, HELD_OUT, OUTPUTS, fit.zeros)["T1|left"]
     assert one["rms"] == pytest.approx(np.sqrt((left**2).mean()), rel=0.02)
     assert f"Recording '{HELD_OUT}' (held out)" in results.summary()
     assert len(results.plot().axes) == 2
