@@ -64,10 +64,11 @@ def next_experiment(
     """
     length = min(LONGEST, max(float(g.time[-1] - g.time[0]) for g in context.grids.values()))
     results: list[tuple[Array, str, Trajectory, Trajectory]] = []
-    wanted = patterns(context, np.linspace(0.0, length, STEPS + 1))
+    time = np.linspace(0.0, length, STEPS + 1)
+    wanted = patterns(context, time)
     for text, inputs in wanted.items():
         try:
-            a, b = (_run(context, model, inputs, length) for model in (answer, other))
+            a, b = (_run(context, model, inputs, time) for model in (answer, other))
         except RunsAwayError:
             continue
         results.append((separation(a, b, noise, known), text, a, b))
@@ -109,9 +110,8 @@ def _read(context: Context) -> set[str]:
     return {y.id for y in shown.values() if isinstance(y, Name)}
 
 
-def _run(context: Context, model: Model, inputs: Mapping[str, Array], length: float) -> Trajectory:
+def _run(context: Context, model: Model, inputs: Mapping[str, Array], time: Array) -> Trajectory:
     """Return a run of a model under a pattern of inputs. It starts as the first recording did."""
-    time = np.linspace(0.0, length, STEPS + 1)
     samples = {
         n: Samples(time, v, context.campaign.channels[n].between == "linear") for n, v in inputs.items()
     }

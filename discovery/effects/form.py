@@ -161,7 +161,7 @@ class Shape:
     spread: float = 0.0
     instant: bool = False
     least: float = 0.0  # what the recordings can show of a time constant, ...
-    most: float = inf  # ... and what they cannot tell from a drift
+    most: float = inf  # ... beyond which it looks like a drift
     apart: float = 3.0
     is_shift: bool = False
     or_at_once: bool = False

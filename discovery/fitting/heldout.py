@@ -102,8 +102,8 @@ def from_known_starts(
     """Residuals (R, Y) of a free run as they would be from the starts that all its readings show.
 
     A body that no sensor reads may begin far from what one first reading shows, and no model is better or
-    worse for that, nor for what inputs did while nobody recorded them. Starts stay within their spread, and
-    so do inputs known only within a spread.
+    worse for that, nor for what inputs did while nobody recorded them. Starts and inputs
+    are known within their spread.
 
     Args:
         residual: readings minus model (R, Y).

@@ -348,7 +348,7 @@ def test_what_is_only_measured_is_not_stepped() -> None:
 
 
 def test_an_input_is_stepped_alone_while_everything_else_is_on() -> None:
-    """What a speed does besides its power shows at constant power alone; a pump is off and on."""
+    """An effect of the speed itself shows only at constant power. A pump is switched off and on."""
     seen = campaign(simulated(1))
     grids = {"r1": make_grid(seen, "r1", machine.INPUTS, list(SEEN))}
     where = cast(Context, SimpleNamespace(campaign=seen, grids=grids, recordings=("r1",)))

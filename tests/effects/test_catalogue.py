@@ -160,7 +160,7 @@ def test_a_time_without_a_middle_is_any_that_the_recordings_show() -> None:
     values = [value for value, _ in shape.values]
     assert isclose(min(values), 30.0, rel_tol=1e-9)
     assert isclose(max(values), 86400.0, rel_tol=1e-9)
-    assert shape.ends == (min(values), max(values))  # a mass of 462 h in two days is told from no drift
+    assert shape.ends == (min(values), max(values))  # in two days, a mass of 462 h looks like a drift
     assert max(np.diff(np.log(values))) < np.log(3.1)  # neighbours are much alike
     given = Shape("t_b", "s", 120000.0, factor=1.6)
     assert given.within(30.0, 600.0) == given  # a bed keeps its time constants or is no bed
