@@ -137,11 +137,20 @@ def first_spreads(problem: Problem, runs: Sequence[Trajectory]) -> dict[Key, flo
         if any(u.spread == "moved" for u in mine):
             shares["moved"] = _BEGINS["moved"] * _unrest(run)
         for u in mine:
-            series = run.x[:, run.system.states.index(u.name)]
-            moved[u.key] = max(shares[u.spread] * float(np.ptp(series)), SETTLED)
+            moves = float(np.ptp(run.x[:, run.system.states.index(u.name)]))
+            if moves <= SETTLED and u.spread == "fitted":  # it only cools down: that is the start
+                moves = _read(run)
+            moved[u.key] = max(shares[u.spread] * moves, SETTLED)
     # how far a body begins from its start is of the machine, what a memory holds of the recording
     of_machine = [u for u in asked if u.spread == "fitted"]
     return moved | {u.key: max(moved[o.key] for o in of_machine if o.name == u.name) for u in of_machine}
+
+
+def _read(run: Trajectory) -> float:
+    """What the readings move, at most, in the unit of their output: an order of magnitude."""
+    readings = run.system.grid.readings
+    columns = (readings[np.isfinite(readings[:, j]), j] for j in range(readings.shape[1]))
+    return max((float(np.ptp(column)) for column in columns if len(column)), default=0.0)
 
 
 def is_settled(u: Unknown) -> bool:

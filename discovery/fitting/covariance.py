@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discovery.fitting.problem import FORMER, Problem
+from discovery.fitting.problem import Problem
 from discovery.models import Model, State
 
 Array = NDArray[np.float64]
@@ -108,27 +108,11 @@ def spread_elsewhere(values: list[float]) -> float:
 
 
 def _with_spreads(problem: Problem) -> dict[str, State]:
-    """The states with the spread of their starts in recordings that no fit has seen.
-
-    One recording says little about the start of one body. The mean over all bodies of its kind counts as
-    `FORMER` recordings, as the spread before does in a fit. A memory that no recording shows but at rest is
-    settled.
+    """The states with the spread of their starts in recordings that no fit has seen. A memory that no
+    recording shows but at rest is settled.
     """
     found = problem.start_spreads()
-    states = {
-        name: replace(one, start_sd=0.0) if one.memory and name not in found else one
+    return {
+        name: replace(one, start_sd=found.get(name, 0.0 if one.memory else one.start_sd))
         for name, one in problem.model.states.items()
     }
-    for name, sd in found.items():
-        alike = [found[other] ** 2 for other in found if _kind(states[other]) == _kind(states[name])]
-        recordings = sum(u.name == name and u.is_start for u in problem.unknowns)
-        shared = FORMER * sum(alike) / len(alike)
-        states[name] = replace(
-            states[name], start_sd=float(np.sqrt((shared + recordings * sd**2) / (FORMER + recordings)))
-        )
-    return states
-
-
-def _kind(state: State) -> tuple[str, bool]:
-    """What a memory holds may be power or a temperature: each is of its own kind."""
-    return state.name if state.memory else state.unit, state.capacity is not None

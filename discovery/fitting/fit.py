@@ -20,7 +20,7 @@ from discovery.fitting.noise import Noise, readings_as_one, resolution, white_no
 from discovery.fitting.problem import FORMER, Prior, Problem, make_problem
 from discovery.fitting.resolution import resolved
 from discovery.fitting.solve import Loss, Solution, free_runs, solve
-from discovery.models import Model
+from discovery.models import Model, State
 from discovery.recordings import Campaign
 from discovery.threads import one_thread
 
@@ -311,25 +311,34 @@ def _found_spreads(
     """By state: the spread of its starts that makes them most likely, and the one before. By output with a
     zero of its own in each recording: the same of its zeros.
 
-    One step of expectation maximisation over the recordings, with the one before as `FORMER` of them.
+    One step of expectation maximisation over the recordings. One recording says little about the start of one
+    body, and a model that lacks something may find it at rest where it was not: the mean over all bodies of
+    its kind counts as `FORMER` recordings.
     """
-    asked = {u.name for u in problem.unknowns if u.spread == "fitted"}
+    asked = {u.name: u.prior[1] for u in problem.unknowns if u.spread == "fitted" and u.prior}
     if not asked:
         return {}
-    covariance = np.linalg.pinv(gram, hermitian=True)
-    found = {}
-    for name in asked:
+    covariance, states = np.linalg.pinv(gram, hermitian=True), problem.model.states
+    found, squares = {}, {}
+    for name, before in asked.items():
         mine = [i for i, u in enumerate(problem.unknowns) if u.name == name and u.spread == "fitted"]
-        before = problem.unknowns[mine[0]].prior
-        assert before is not None
         if problem.unknowns[mine[0]].is_offset:
             grid = problem.systems[0].grid
             known = np.linalg.pinv(covariance[np.ix_(mine, mine)], hermitian=True) / together
-            found[name] = likeliest_spread(theta[mine], known, before[1], grid.spread[name]), before[1]
-            continue
-        squares = sum(theta[i] ** 2 + together * covariance[i, i] for i in mine)
-        found[name] = (float(np.sqrt((FORMER * before[1] ** 2 + squares) / (FORMER + len(mine)))), before[1])
+            found[name] = likeliest_spread(theta[mine], known, before, grid.spread[name]), before
+        else:
+            squares[name] = theta[mine] ** 2 + together * np.diag(covariance)[mine]
+    for name, own in squares.items():
+        alike = [other for other in squares if _kind(states[other]) == _kind(states[name])]
+        shared = FORMER * np.mean([np.mean(squares[other]) for other in alike])
+        square = (shared + np.sum(own)) / (FORMER + len(own))
+        found[name] = float(np.sqrt(square)), asked[name]
     return found
+
+
+def _kind(state: State) -> tuple[str, bool]:
+    """Starts of bodies are of a kind, and those of other states in the same unit."""
+    return state.unit, state.capacity is not None
 
 
 def likeliest_spread(zeros: Array, precision: Array, before: float, stated: float) -> float:

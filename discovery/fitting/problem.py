@@ -29,7 +29,7 @@ from discovery.recordings import Campaign
 
 Array = NDArray[np.float64]
 
-FORMER = 2  # recordings as which the spread of starts that was believed before counts
+FORMER = 2  # recordings as which the mean spread of the starts of all bodies counts
 MOST = 2.0  # of what is expected, the most that an input is logged late
 FARTHEST = 1e6  # times its start that a parameter may go: no recording shows more, and the arithmetic fails
 UNREAD = 10.0  # K within which a temperature that nobody reads is what its author believes, without a `prior`
