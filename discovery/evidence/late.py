@@ -1,8 +1,8 @@
 """Inputs that may be logged late: a switch some seconds before its stamp looks like missing heat.
 
 A logger that holds, averages or smooths its samples is late or early by up to about one of its intervals.
-This shift is an unknown of each recording, like the offset of an input with a spread. It is left out if
-readings are rarer than the samples, or if a shift by a whole interval could not pass for an effect.
+This shift is an unknown of each recording, like the offset of an input with a spread. It is left out if a
+shift by a whole interval could not pass for an effect.
 
 A shift that differs from switch to switch is noise (`process_noise.py`).
 """
@@ -59,13 +59,9 @@ def perhaps_late(fit: Fit, campaign: Campaign, grids: Mapping[str, Grid], enough
 
 
 def _possible(grid: Grid) -> dict[str, float]:
-    """Logging interval in s of each input that moves, where an output was read as often, but for readings
-    that are missing. What counts is what was recorded: means over blocks of a coarsened grid follow a late
-    stamp, too.
-    """
-    spacing = min((grid.logged[y] for y in grid.outputs if y in grid.logged), default=np.inf)
+    """Logging interval in s of each input that moves."""
     moving = [n for n, one in grid.samples.items() if n in grid.logged and np.ptp(one.value) > 0]
-    return {n: grid.logged[n] for n in moving if np.rint(spacing / grid.logged[n]) <= 1}
+    return {n: grid.logged[n] for n in moving}
 
 
 def sentences(fit: Fit, is_right: bool = True) -> list[str]:

@@ -22,7 +22,6 @@ from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
-from tests import machine
 
 Array = NDArray[np.float64]
 COIL, FRAME, LINK, AIR = 3000.0, 30000.0, 14.0, 6.0  # J/K, W/K
@@ -89,6 +88,21 @@ def found(seen: Campaign) -> tuple[str, ...]:
 
 def test_a_power_that_is_logged_late_is_no_missing_physics(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = campaign(light(1, 40.0), light(2, 35.0))
+    assert found(seen) == ()
+    monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _fit, _seen, grids, _enough: grids)
+    assert found(seen) != ()
+
+
+def rarely(run: Recording) -> Recording:
+    """The recording with every third reading only; the power is recorded as often as before."""
+    kept = np.arange(len(run.time)) % 3 == 0
+    read = {n: np.where(kept, v, np.nan) for n, v in run.values.items() if n in ("coil", "frame")}
+    return replace(run, values={**run.values, **read})
+
+
+def test_a_late_power_shows_in_readings_that_are_rarer_than_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Temperatures each 3 min, power each minute. A spindle that was read each 10 min had a wrong name."""
+    seen = campaign(rarely(light(1, 40.0)), rarely(light(2, 35.0)))
     assert found(seen) == ()
     monkeypatch.setattr("discovery.diagnosis.context.perhaps_late", lambda _fit, _seen, grids, _enough: grids)
     assert found(seen) != ()
@@ -233,20 +247,15 @@ def test_it_is_asked_only_where_readings_show_a_shift() -> None:
     seen = campaign(light(5, 0.0))
     context = make_context(seen, model(), ["r5"], ("coil", "frame"), [], after(seen))
     assert context.grids["r5"].unsure == {"P": INTERVAL}
-    rare = light(5, 0.0)
-    for name in ("coil", "frame"):
-        rare.values[name][np.arange(len(rare.time)) % 3 > 0] = np.nan
-    grid = make_grid(campaign(rare), "r5", ["P", "room"], ["coil", "frame"])
-    assert perhaps_late(context.baseline, seen, {"r5": grid}, SHORT)["r5"].unsure == {}
     gaps = light(5, 0.0)  # a crusher with irregular stamps and a twentieth of its readings missing
     gaps.values["coil"][::20], gaps.values["frame"][5::20] = np.nan, np.nan
     stamps = gaps.time + np.random.default_rng(5).uniform(0.0, 0.9 * INTERVAL, len(gaps.time))
     holes = make_grid(campaign(replace(gaps, time=stamps)), "r5", ["P", "room"], ["coil", "frame"])
     assert min(holes.logged["coil"], holes.logged["frame"]) > holes.logged["P"]
     assert "P" in perhaps_late(context.baseline, seen, {"r5": holes}, SHORT)["r5"].unsure
-    slow = machine.campaign(machine.simulated(1), machine.simulated(2))
-    context = make_context(slow, machine.model(), ["r1", "r2"], tuple(machine.SEEN), [], after(slow))
-    assert not any(g.unsure for g in context.grids.values())
+    noise = {name: replace(seen.channels[name], noise=30.0) for name in ("coil", "frame")}
+    blurred = replace(seen, channels={**seen.channels, **noise})
+    assert not perhaps_late(context.baseline, blurred, context.grids, SHORT)["r5"].unsure
 
 
 def test_readings_that_are_averaged_by_the_program_still_show_a_shift() -> None:
