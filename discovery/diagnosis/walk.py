@@ -28,7 +28,8 @@ def walked(start: Node, ways: Sequence[Near], tried: Callable[[Node], S], goal: 
     has been, and is below a goal.
 
     Args:
-        ways: the neighbours of a node; those of the second way are asked once the first one leads no further.
+        ways: the neighbours of a node; those of the second way are asked once the first one leads no further,
+            and ends near the goal.
         tried: what is known at a node; each is tried once.
         goal: log evidence from which the others matter.
     """
@@ -46,7 +47,8 @@ def walked(start: Node, ways: Sequence[Near], tried: Callable[[Node], S], goal: 
     level(start)
     for near in ways:
         top = _climbed(max(best, key=level), near, level)
-        if levels[top] < goal:
+        # a climb of the first way alone may end below the top
+        if levels[top] < goal - (2 * SMALL if near is not ways[-1] else 0.0):
             break
         asked = {top}
         while True:

@@ -376,6 +376,6 @@ def test_a_fit_settles_under_the_noise_that_it_makes_likely() -> None:
     assert last is not None
     assert first.ahead > MOVED
     assert last.ahead < 0.01 * MOVED
-    assert last.evidence > first.evidence + 0.5
+    assert last.reached > first.reached + 0.5
     size = {name: p.value for name, p in last.fit.model.parameters.items()}
     assert size["hF_table"] == pytest.approx(30.0, rel=0.05)

@@ -10,7 +10,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from discovery.diagnosis.walk import KEPT, Node, walked
+from discovery.diagnosis.walk import KEPT, SMALL, Node, walked
 
 SIZE = (5, 6, 7, 3)
 NODES = list(product(*map(range, SIZE)))
@@ -87,5 +87,7 @@ def test_a_second_way_begins_where_the_first_one_ends() -> None:
     assert {one.node[3] for one in first} == {0}
     both = walked(start, ways, tried, -np.inf)
     assert both == walk(levels, start)[0]
-    assert walked(start, ways, tried, first[0].evidence + 1e-9) == walked(start, ways[:1], tried, np.inf)
+    near_it, far = first[0].evidence + 1e-9, first[0].evidence + 2 * SMALL + 1e-9
+    assert walked(start, ways, tried, near_it)[0] == both[0]  # it may end below the top
+    assert walked(start, ways, tried, far) == walked(start, ways[:1], tried, np.inf)
     assert walked(start, (), tried, -np.inf) == [tried(start)]
