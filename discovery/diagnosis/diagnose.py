@@ -31,6 +31,7 @@ from discovery.diagnosis.unknown_law import instead
 from discovery.diagnosis.verdict import FAULT, NO_MISMATCH, UNEXPLAINED, Verdict, decide
 from discovery.diagnosis.withdrawal import (
     idle,
+    not_of_a_logger,
     refuted,
     small,
     unfinished,
@@ -253,6 +254,7 @@ def diagnose(
         after = None
     in_fit = [h for h in hung if h.recording in fit]
     verdict = unforeseen(verdict, judged.held_out, unit)
+    verdict = not_of_a_logger(verdict, late.beyond(found.baseline.fit))
     verdict = wrong_readings(verdict, len(context.outliers), len(in_fit))
     law = instead(context, verdict.answer) if verdict.word == UNEXPLAINED else None
     mine = tuple(searched(found, verdict, effects))

@@ -5,6 +5,7 @@ file.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from discovery.diagnosis.scored import Scored
 from discovery.diagnosis.tree import Tree, grown
 from discovery.dynamics import Trajectory
+from discovery.dynamics.system import shifted
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import Force
 from discovery.models import Model
@@ -34,7 +36,7 @@ def of_effects(best: Scored, effects: Sequence[Hypothesis], baseline: Model) -> 
     x: list[Array] = []
     heat: list[Array] = []
     names: list[str] = []
-    for trajectory in best.fit.trajectories:
+    for trajectory in map(_as_stamped, best.fit.trajectories):
         ends = trajectory.at_ends()
         known = {*trajectory.system.grid.nodes, *(n for n, s in baseline.states.items() if not s.memory)}
         names = [name for name in ends if name in known and name != "time" and np.ndim(ends[name])]
@@ -96,6 +98,11 @@ def of_free_heat(baseline: Scored, f: Force, seed: int = 0) -> str | None:
     if float(tree.score(features, heat)) < np.quantile(shuffled, 0.95):
         return None
     return _rule(_path(tree, names), switches or set())
+
+
+def _as_stamped(run: Trajectory) -> Trajectory:
+    """A run with its inputs as their stamps say: a switch that comes late is a part of itself for a step."""
+    return replace(run, system=shifted(run.system, run.system.grid.offset))
 
 
 def heat_of(best: Scored, trajectory: Trajectory, h: Hypothesis, body: str = "") -> Array:

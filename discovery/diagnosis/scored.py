@@ -313,7 +313,10 @@ def _over_noise(
     # other neighbours are not asked
     rounds = (True, False) if forces else (False,)
     ways = [partial(near, less) for less in rounds if bare.acts]  # what does not act is so under every noise
-    kept = walked((*grid.closest(begin, allowed), 0), ways, tried, goal)
+    first = grid.closest(begin, allowed)
+    # all other models begin with the noise of one that has been there
+    others = grid.at_other_times(first) if not (bare.hypotheses or forces) else []
+    kept = walked([(*one, 0) for one in (first, *others)], ways, tried, goal)
     return replace(
         bare,
         settings=tuple(one.settings[0] for one in kept),

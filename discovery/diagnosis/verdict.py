@@ -83,9 +83,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
         more = _is_more(answer.evidence - alone, thresholds.SHORT * max(len(others), 1))
         return more and _supports(together_left_out(context, answer, others))
 
-    # what does not improve free runs outside the fit is not lacking either
-    nothing = set(idle) if idle and not acts() else set[Key]()
-    reasons = [*dict.fromkeys(refused.values()), *(text for key, text in idle.items() if key not in nothing)]
+    # what no event can be, or does not improve free runs outside the fit, is not lacking either
+    withheld = {**refused, **idle}
+    nothing = set(withheld) if withheld and not acts() else set[Key]()
+    reasons = [*dict.fromkeys(text for key, text in withheld.items() if key not in nothing)]
     # a law has no name: it matters only where a name may stand for it
     lacking = (found.baseline, answer) if named else ()
     laws = [law for m in lacking for law in with_law(context, m, found.goal(m.noise))]
@@ -126,7 +127,7 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
             )
     unsure = [n for n in candidates if n not in sure and n.hypothesis.key not in refused]
     further = (
-        *(text for key, text in idle.items() if key in nothing),
+        *dict.fromkeys(text for key, text in withheld.items() if key in nothing),
         *apart(found, answer, unsure, least),
     )
     every = (*reasons, *further)

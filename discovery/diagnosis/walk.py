@@ -23,11 +23,12 @@ class Seen(Protocol):
 S = TypeVar("S", bound=Seen)
 
 
-def walked(start: Node, ways: Sequence[Near], tried: Callable[[Node], S], goal: float) -> list[S]:
+def walked(starts: Sequence[Node], ways: Sequence[Near], tried: Callable[[Node], S], goal: float) -> list[S]:
     """The most likely nodes, best first: each that matters has been asked for its neighbours, or the best
     has been, and is below a goal.
 
     Args:
+        starts: where climbs begin: there may be several tops.
         ways: the neighbours of a node; those of the second way are asked once the first one leads no further,
             and ends near the goal.
         tried: what is known at a node; each is tried once.
@@ -44,9 +45,10 @@ def walked(start: Node, ways: Sequence[Near], tried: Callable[[Node], S], goal: 
                 del best[min(best, key=lambda kept: levels[kept])]
         return levels[node]
 
-    level(start)
+    begins = list(starts)
+    level(begins[0])
     for near in ways:
-        top = _climbed(max(best, key=level), near, level)
+        top = max([_climbed(one, near, level) for one in begins], key=level)
         # a climb of the first way alone may end below the top
         if levels[top] < goal - (2 * SMALL if near is not ways[-1] else 0.0):
             break
@@ -59,6 +61,7 @@ def walked(start: Node, ways: Sequence[Near], tried: Callable[[Node], S], goal: 
             asked.add(here)
             for node in near(here):
                 level(node)
+        begins = [max(best, key=level)]
     return [best[node] for node in sorted(best, key=lambda node: -levels[node])]
 
 

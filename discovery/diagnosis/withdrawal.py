@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import expm1, inf, isfinite, log
 
@@ -226,6 +226,17 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
     return replace(verdict, word=word, reasons=(*_large(verdict), reason))
+
+
+def not_of_a_logger(verdict: Verdict, said: Sequence[str]) -> Verdict:
+    """The verdict where nothing is missing, but for inputs that are late by more than a logger makes.
+
+    Args:
+        said: a sentence for each of them.
+    """
+    if verdict.word != NO_MISMATCH or not said:
+        return verdict
+    return replace(verdict, word=UNEXPLAINED, reasons=(*said, *verdict.reasons))
 
 
 def wrong_readings(verdict: Verdict, single: int, hung: int = 0) -> Verdict:

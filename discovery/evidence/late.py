@@ -71,22 +71,49 @@ def sentences(fit: Fit, is_right: bool = True) -> list[str]:
         is_right: whether nothing else is missing. If something is, the shift may stand for it, and is said
             only where it is more than a logger makes.
     """
-    found: dict[str, list[str]] = {}
-    for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
-        least = (SMALL if is_right else 1.0) * u.prior[1] if u.is_late and u.prior else np.inf
-        if abs(value) > max(SAID * error, least):
-            size = f"{abs(value):.0f}" if abs(value) >= 1 else printed(abs(value), 2)
-            late = f"{size} s {'late' if value > 0 else 'early'} in {u.recording}"
-            found.setdefault(u.name, []).append(late)
     runs = len(fit.trajectories)
     if not is_right:
         return [
-            f"in the fit, {name} is logged {', '.join(late)}: a dead time, or what the model leaves out, may "
+            f"in the fit, {name} is logged {_those(late)}: a dead time, or what the model leaves out, may "
             "look like this"
-            for name, late in found.items()
+            for name, late in _found(fit, 1.0).items()
         ]
     return [
-        f"{name} is logged {', '.join(late)}; the fit allows for it"
-        + (", and a dead time looks the same" if 1 < runs == sum("early" in text for text in late) else "")
-        for name, late in found.items()
+        f"{name} is logged {_those(late)}; the fit allows for it"
+        + (", and a dead time looks the same" if 1 < runs == len(late) and max(late.values()) < 0 else "")
+        for name, late in _found(fit, SMALL).items()
     ]
+
+
+def beyond(fit: Fit) -> list[str]:
+    """A sentence for each input that every recording has late, or early, by more than a logger makes."""
+    return [
+        f"{name} would be logged {_those(late)}, more than the interval of its samples: a dead time, or "
+        "another body between the input and what is read, looks the same"
+        for name, late in _found(fit, 1.0, apart=True).items()
+        if len(late) == len(fit.trajectories) and (max(late.values()) < 0 or min(late.values()) > 0)
+    ]
+
+
+def _found(fit: Fit, least: float, apart: bool = False) -> dict[str, dict[str, float]]:
+    """Seconds by which each input is logged late in each recording, where this is sure.
+
+    Args:
+        least: of a logging interval, what is worth saying.
+        apart: it is more than that by as many standard errors as it has to be more than nothing.
+    """
+    found: dict[str, dict[str, float]] = {}
+    for u, value, error in zip(fit.problem.unknowns, fit.theta, fit.standard_errors, strict=True):
+        if u.is_late and u.prior and u.recording:
+            size, sure = least * u.prior[1], SAID * error
+            if abs(value) > (size + sure if apart else max(size, sure)):
+                found.setdefault(u.name, {})[u.recording] = float(value)
+    return found
+
+
+def _those(late: dict[str, float]) -> str:
+    def one(seconds: float) -> str:
+        size = f"{abs(seconds):.0f}" if abs(seconds) >= 1 else printed(abs(seconds), 2)
+        return f"{size} s {'late' if seconds > 0 else 'early'}"
+
+    return ", ".join(f"{one(seconds)} in {run}" for run, seconds in late.items())

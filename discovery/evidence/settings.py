@@ -135,6 +135,13 @@ class Settings:
         found = [tuple(at + step.get(axis, 0) for axis, at in enumerate(place)) for step in steps]
         return [one for one in found if all(0 <= at < len(a) for at, a in zip(one, self.axes, strict=True))]
 
+    def at_other_times(self, place: Place) -> list[Place]:
+        """The place with the other time constants of process noise: with another one, less noise may do as
+        much, and no single step leads there.
+        """
+        k = AXES.index("time")
+        return [(*place[:k], t, *place[k + 1 :]) for t in range(len(self.axes[k])) if t != place[k]]
+
     def closest(self, noise: Noise, allowed: Callable[[Setting], bool]) -> Place:
         """The place most alike to a noise among some, axis by axis: what is allowed, and what is alike, is so
         on each axis for itself.

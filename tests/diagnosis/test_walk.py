@@ -46,7 +46,7 @@ def walk(levels: dict[Node, float], start: Node, goal: float = -np.inf) -> tuple
         asked.append(node)
         return At(node, levels[node])
 
-    return walked(start, [near], tried, goal), asked
+    return walked([start], [near], tried, goal), asked
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -83,11 +83,29 @@ def test_a_second_way_begins_where_the_first_one_ends() -> None:
     def tried(node: Node) -> At:
         return At(node, levels[node])
 
-    first = walked(start, ways[:1], tried, -np.inf)
+    first = walked([start], ways[:1], tried, -np.inf)
     assert {one.node[3] for one in first} == {0}
-    both = walked(start, ways, tried, -np.inf)
+    both = walked([start], ways, tried, -np.inf)
     assert both == walk(levels, start)[0]
     near_it, far = first[0].evidence + 1e-9, first[0].evidence + 2 * SMALL + 1e-9
-    assert walked(start, ways, tried, near_it)[0] == both[0]  # it may end below the top
-    assert walked(start, ways, tried, far) == walked(start, ways[:1], tried, np.inf)
-    assert walked(start, (), tried, -np.inf) == [tried(start)]
+    assert walked([start], ways, tried, near_it)[0] == both[0]  # it may end below the top
+    assert walked([start], ways, tried, far) == walked([start], ways[:1], tried, np.inf)
+    assert walked([start], (), tried, -np.inf) == [tried(start)]
+
+
+def test_of_two_hills_the_higher_one_counts() -> None:
+    """The way between them is lower than both."""
+    tops = {(0, 2, 3, 1): 0.0, (4, 3, 3, 1): 3.0}
+    levels = {
+        n: max(
+            high - 2.0 * sum((a - b) ** 2 for a, b in zip(n, top, strict=True)) for top, high in tops.items()
+        )
+        for n in NODES
+    }
+
+    def tried(node: Node) -> At:
+        return At(node, levels[node])
+
+    starts = [(0, 0, 0, 0), (4, 0, 0, 0)]
+    assert walked(starts[:1], [near], tried, -np.inf)[0].node == (0, 2, 3, 1)
+    assert walked(starts, [near], tried, -np.inf)[0].node == (4, 3, 3, 1)
