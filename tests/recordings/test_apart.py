@@ -40,3 +40,11 @@ def test_a_step_test_that_goes_on_is_not_damaged(tau: float) -> None:
 def test_one_that_begins_as_the_other_can_be_damaged() -> None:
     pair = [recorded("one", 0, 42, 150.0), recorded("another", 0, 42, 150.0, 1 / 60)]
     assert [one.repair.kind for one in disagreements(pair, CHANNELS)] == ["time"]
+
+
+def test_no_output_that_both_have_needs_no_repair() -> None:
+    """A thermometer that the second recording hardly read: there is nothing to compare the inputs by."""
+    pair = [recorded("one", 0, 42, 150.0), recorded("another", 0, 42, 150.0)]
+    pair[1].values["T"][3:] = np.nan
+    pair[1].values["heater"][20:] = 0.0
+    assert disagreements(pair, CHANNELS) == []

@@ -107,7 +107,7 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
     usual = {y: known.usual_misfit(one.name, y) for y in misfit}
     misfit = {y: m for y, m in misfit.items() if two or usual[y] <= _POOR}
     wrong = {y for y, m in misfit.items() if m > _SUSPECT * usual[y]}
-    if not wrong and not two:
+    if not misfit or not (wrong or two):  # nothing can be compared, or nothing is off
         return []
     found = []
     for repair in _candidates(known, one, predicted, {y: read[y] for y in misfit}):
