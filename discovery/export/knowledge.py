@@ -29,6 +29,7 @@ from discovery.evidence.form_error import edge_columns, law_columns, scales_of
 from discovery.evidence.process_noise import floors, reading_noise
 from discovery.evidence.whitening import Whitened
 from discovery.fitting import Fit, Noise
+from discovery.fitting.begin import first_noise
 from discovery.fitting.noise import resolution, white_noise
 from discovery.fitting.problem import Problem, make_problem
 from discovery.models import Model
@@ -52,6 +53,7 @@ SHARES = (
 SLOW = (0.0, 0.15, 0.3, 0.6, 1.0, 2.0, 4.0, 8.0)  # slow noise of outputs, in reading noises
 FORMS = (0.0, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25)  # by which laws are off at an operating point ...
 EDGES = (0.0, 0.02, 0.05, 0.1, 0.25)  # ... and of flows that enter the neighbours of a body
+_ROUNDS, _STAYS = 20, 0.02  # at most, and relative change, of a reading noise that is not stated
 SEEN = 1e-3  # of the information before any reading, below which a direction is not kept
 
 
@@ -121,15 +123,13 @@ def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Kn
     if not outputs:
         return Knowledge(dict.fromkeys(model.outputs), (), None, {}, {}, np.zeros((0, 1)))
     problem = problem_of(model, campaign, recordings, outputs)
-    theta, runs = settle_starts(problem)
+    stated = {name: campaign.channels[name].noise for name in outputs}
+    theta, runs, white = _settled(problem, stated)
     residuals = [problem.residual(run) for run in runs]
     level = {
         name: max(float(np.sqrt(np.nanmean(np.concatenate([r[:, j] for r in residuals]) ** 2))), 1e-6)
         for j, name in enumerate(outputs)
     }
-    stated = {name: campaign.channels[name].noise for name in outputs}
-    least = resolution([system.grid.single for system in problem.systems])
-    white = white_noise(outputs, stated, residuals, least)
     fit = Fit(problem, theta, np.zeros((len(theta),) * 2), white, runs, 0.0, (), 0.0)
     ambient = [n for n, channel in campaign.channels.items() if channel.role == "ambient temperature"]
     floor = floors(fit, thresholds.FLOOR, ambient, thresholds.AIR, own=False)
@@ -181,8 +181,32 @@ def _free(model: Model, name: str) -> bool:
     return p.min + near < p.value < p.max - near
 
 
-def settle_starts(problem: Problem) -> tuple[Array, tuple[Trajectory, ...]]:
-    """Two Gauss-Newton steps on the start values alone: unknowns (U,) and the free runs there."""
+def _settled(
+    problem: Problem, stated: Mapping[str, float | None]
+) -> tuple[Array, tuple[Trajectory, ...], Noise]:
+    """Unknowns (U,) and free runs with settled start values, and the reading noise that weighs the readings.
+
+    As in the fit, a noise that is not stated is that of the residual: it falls from what the declared starts
+    leave, until it stays.
+    """
+    least = resolution([system.grid.single for system in problem.systems])
+    noise = first_noise(problem, [problem.run(s, problem.start) for s in problem.systems], stated, least)
+    for _ in range(_ROUNDS):
+        theta, runs = settle_starts(problem, noise.white)
+        single = [problem.residual(run) * run.system.grid.per_reading for run in runs]
+        before, noise = noise, white_noise(problem.outputs, stated, single, least)
+        if max(abs(np.log(a / b)) for a, b in zip(noise.white, before.white, strict=True)) < _STAYS:
+            break
+    return theta, runs, noise
+
+
+def settle_starts(problem: Problem, white: Sequence[float]) -> tuple[Array, tuple[Trajectory, ...]]:
+    """Two Gauss-Newton steps on the start values alone: unknowns (U,) and the free runs there.
+
+    Args:
+        white: (Y,) noise of a reading. A start is known by its spread, and by readings as far as they are
+            precise: a model starts without a reading, so a body may have begun far from its declared start.
+    """
     theta = problem.start
     starts = [i for i, u in enumerate(problem.unknowns) if u.is_nuisance]
     for _ in range(2 if starts else 0):
@@ -190,11 +214,12 @@ def settle_starts(problem: Problem) -> tuple[Array, tuple[Trajectory, ...]]:
         pull = -np.diag(information) * (theta - problem.start)[starts]
         for system in problem.systems:
             trajectory = problem.run(system, theta)
-            residual = problem.residual(trajectory)
-            seen = np.isfinite(residual)
-            rows = problem.jacobian(trajectory)[seen][:, starts]
+            weighed = problem.residual(trajectory) / system.grid.sd(white)
+            seen = np.isfinite(weighed)
+            slopes = problem.jacobian(trajectory)[:, :, starts] / system.grid.sd(white)[:, :, None]
+            rows = slopes[seen]
             information = information + rows.T @ rows
-            pull += rows.T @ residual[seen]
+            pull += rows.T @ weighed[seen]
         theta = theta.copy()
         theta[starts] += np.linalg.solve(information, pull)
     return theta, tuple(problem.run(system, theta) for system in problem.systems)

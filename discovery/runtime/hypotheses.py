@@ -301,7 +301,7 @@ def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str], 
     scale = np.array([levels[n] for n in outputs])
     after = sum(float(system.grid.time[-1]) for system in problem.systems)
     total, weight = 0.0, 0.0
-    for run in settle_starts(problem)[1]:
+    for run in settle_starts(problem, scale.tolist())[1]:
         grid = run.system.grid
         squares = (problem.residual(run) / scale) ** 2
         share = np.exp((grid.time[grid.read] - after) / memory)

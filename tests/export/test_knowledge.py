@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from discovery.errors import UserError
 from discovery.export.knowledge import Knowledge, knowledge, read_knowledge
+from discovery.export.makedocument import exportable
+from discovery.fitting import fit_model
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
-from discovery.terms import parse
+from discovery.terms import Term, parse
 
 Array = NDArray[np.float64]
 CHANNELS = {
@@ -87,3 +89,38 @@ def test_what_was_not_read_is_not_known() -> None:
 
 def test_what_belongs_to_one_recording_is_left_out() -> None:
     assert known({"E": NOISE}, {"E": "k*u"}, r=2.0).parameters == ()
+
+
+def test_the_residual_is_that_of_the_fit() -> None:
+    """A body that begins 30 K above the room, where a controller would start it, and an error with it: what
+    is left is what the fit left, and the reading noise that it found.
+    """
+    rng, hours = np.random.default_rng(3), np.linspace(0.0, 12.0, 60)
+    body = 22.0 + 25.0 * (1.0 - np.exp(-hours / 2.0)) + 30.0 * np.exp(-hours / 2.0)
+    values = {
+        "u": np.full(60, 200.0),
+        "room": np.full(60, 22.0),
+        "T": body + rng.normal(0.0, 0.02, 60),
+        "E": body - 22.0 + rng.normal(0.0, 0.1, 60),
+    }
+    channels = {
+        "u": CHANNELS["u"],
+        "room": Channel("room", "ambient temperature", "degC", None, "linear"),
+        "T": Channel("T", "temperature", "degC", None, "linear"),
+        "E": Channel("E", "error", "um", None, "linear"),
+    }
+    campaign = Campaign("c", channels, {"r": Recording("r", 3600.0 * hours, values)})
+    model = Model(
+        "warm",
+        {"hA": Parameter(8.0, min=0.0), "k": Parameter(1.1)},
+        {"T": State("T", "degC", 5.76e4, None, None, 1 / 5.76e4)},
+        (Term("heat", "T", parse("u")), Term("air", "T", parse("hA*(room - T)"))),
+        {"E": parse("k*(T - 22)")},
+    )
+    fit = fit_model(model, campaign, ["r"])
+    left = dict(zip(fit.problem.outputs, np.sqrt(np.mean(fit.residuals()["r"] ** 2, axis=0)), strict=True))
+    found = knowledge(exportable(fit.model, campaign), campaign, ["r"])
+    assert found.residual == {name: pytest.approx(left[name], rel=0.02) for name in found.residual}
+    assert found.noise is not None
+    said = dict(zip(found.noise.outputs, found.noise.white, strict=True))
+    assert said == pytest.approx(dict(zip(fit.noise.outputs, fit.noise.white, strict=True)), rel=0.02)
