@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from discovery.errors import UserError
 from discovery.export.compiled import Compiled, compile_model, model_inputs
 from discovery.export.ranges import InputRange, OutputRange
-from discovery.export.seal import Seal, open_seal, seal_bytes
+from discovery.export.seal import Seal, keeping_signature, open_seal, seal_bytes
 from discovery.export.trend import Trend, read_trend
 from discovery.extras import need
 from discovery.files import write_atomic
@@ -70,8 +70,12 @@ def render(document: Mapping[str, Any], key: Ed25519PrivateKey | None = None) ->
 
 
 def write_document(path: Path, document: Mapping[str, Any], key: Ed25519PrivateKey | None = None) -> None:
-    """Write a sealed document; signed when a key is given."""
-    write_atomic(path, render(document, key))
+    """Write a sealed document; signed when a key is given.
+
+    Raises:
+        UserError: no key is given, and another document stands there that is signed.
+    """
+    write_atomic(path, keeping_signature(path, render(document, key)))
 
 
 def read_document(path: Path) -> Exported:

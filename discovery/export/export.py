@@ -29,7 +29,7 @@ from discovery.export.replay import (
     replay_source,
     write_files,
 )
-from discovery.export.seal import open_seal
+from discovery.export.seal import keeping_signature, open_seal
 from discovery.export.settling import beginning
 from discovery.export.st import KINDS, plcopen_text, prove_st, scl_text, st_name, st_text
 from discovery.models import Model
@@ -89,12 +89,13 @@ def export_model(
         out_dir: folder that the files go to.
         step_s: fixed internal step [s].
         states: reduce the model to so many states first (see `discovery.export.reduce`).
-        key: signs the document.
+        key: signs the document. Without one, a signed document in `out_dir` that says the same is kept.
         provenance: what else should be known about where the model comes from.
 
     Raises:
         UsageError: an unknown target, or an impossible step.
-        UserError: a model that cannot be exported, or a target that is not equal; then nothing is written.
+        UserError: a model that cannot be exported, a target that is not equal, or another document in
+            `out_dir` that is signed, without a key for this one; then nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
     check_targets(targets)
@@ -115,7 +116,7 @@ def export_model(
         notes["reduction"] = reduction.note()
     found = agreement(model, campaign, recordings[0], step_s)
     document = make_document(model, campaign, recordings, step_s, {**notes, "agreement_with_dynamics": found})
-    data = render(document, key)
+    data = keeping_signature(out_dir / _file_of(model), render(document, key))
     body, seal = open_seal(data, model.name)
     exported = from_document(body, seal, model.name)
     inputs = sampled_inputs(campaign, recordings[0], exported.compiled.inputs, step_s)
@@ -125,12 +126,17 @@ def export_model(
     return Export(tuple(out_dir / name for name in files), proofs, found, tuple(beginning(exported)))
 
 
+def _file_of(model: Model) -> str:
+    """The name of the document of a model in its folder."""
+    return f"{identifier(model.name)}.json"
+
+
 def _files(
     exported: Exported, data: bytes, reference: Reference, targets: Sequence[str]
 ) -> tuple[dict[str, str | bytes], tuple[Proof, ...]]:
     """Files of a document and its targets by name, and the proofs that the targets agree with the model."""
     stem = identifier(exported.model.name)
-    files: dict[str, str | bytes] = {f"{stem}.json": data}
+    files: dict[str, str | bytes] = {_file_of(exported.model): data}
     proofs: list[Proof] = []
     for target in dict.fromkeys(targets):
         made, proved = _TARGETS[target](exported, reference, stem)
@@ -250,15 +256,17 @@ def export_document(
 
     Raises:
         UsageError: an unknown target.
-        UserError: a document that cannot be read, or a target that is not equal; then nothing is written.
+        UserError: a document that cannot be read, a target that is not equal, or another document in
+            `out_dir` that is signed where this one is not; then nothing is written.
     """
     targets = (to,) if isinstance(to, str) else tuple(to)
     check_targets(targets)
     exported = read_document(path)
+    out_dir = out_dir or path.with_suffix("")
     data = render(exported.document, key) if key is not None else path.read_bytes()
+    data = keeping_signature(out_dir / _file_of(exported.model), data)
     reference = make_reference(exported.compiled, _through_the_ranges(exported))
     files, proofs = _files(exported, data, reference, targets)
-    out_dir = out_dir or path.with_suffix("")
     write_files(out_dir, files)
     return Export(tuple(out_dir / name for name in files), proofs, None, tuple(beginning(exported)))
 

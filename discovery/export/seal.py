@@ -76,6 +76,32 @@ def open_seal(data: bytes, place: str | Path) -> tuple[dict[str, Any], Seal]:
     return document, seal
 
 
+def keeping_signature(path: Path, data: bytes) -> bytes:
+    """The bytes to write at `path`: `data`, or the signed file that stands there, where `data` is the same
+    document without a signature.
+
+    Raises:
+        UserError: `data` is unsigned, and another document stands there that is signed.
+    """
+    head, _, _ = data.rpartition(MARK)
+    if not path.is_file() or open_seal(data, path)[1].signature is not None:
+        return data
+    old = path.read_bytes()
+    try:
+        signed = open_seal(old, path)[1].signature is not None
+    except UserError:
+        _crypto()  # without it nobody knows; with it, this is no signature that anybody could trust
+        return data
+    if not signed:
+        return data
+    if old.rpartition(MARK)[0] == head:
+        return old
+    raise UserError(
+        f"{path}: it is signed, and the model to write is another one without a signature; nothing was "
+        "written; sign this one (`--sign KEY`), or write it to another place (`--out`)"
+    )
+
+
 def _json(data: bytes) -> dict[str, Any]:
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         found = dict(pairs)
