@@ -87,11 +87,10 @@ def _temperature(
     for load in _belonging(output, drives(guesses), outputs):
         unit = canonical(guesses[load])
         # copper warms with the square of its current, a resistor with that of its voltage
-        heat, per = (f"{load}**2", f"{unit}**2") if squared(guesses[load]) else (load, unit)
+        heat, power = (f"{load}**2", f"{unit}**2") if squared(guesses[load]) else (load, unit)
         # a load that is counted below zero, as a discharge is, may warm all the same
         least = "" if guesses[load].below_zero and heat == load else "0.0"
-        per = f"({per})" if "/" in per else per  # of an irradiance
-        gain = block.parameter(f"gain_{output}_{load}", "0.0", f"K/{per}/s", least=least)
+        gain = block.parameter(f"gain_{output}_{load}", "0.0", f"K{per(power)}/s", least=least)
         block.term(f"{load} warms {output}", output, f"{gain}*{heat}")
     for fan in [name for name, one in guesses.items() if one.quantity == "fan"] if room else []:
         more = block.parameter(f"{fan}_{output}", "1e-4", f"1/s{_per(canonical(guesses[fan]))}", least="0.0")
@@ -101,8 +100,8 @@ def _temperature(
     )
     for fluid, pump in product(fluids, pumps or [""]):  # which fluid a pump moves is for the fit to find
         of = [*[pump] * (len(pumps) > 1), *[fluid] * (len(fluids) > 1)]
-        per = _per(canonical(guesses[pump])) if pump else ""
-        name = block.parameter("_".join(["fluid", *of, output]), "1e-4", f"1/s{per}", least="0.0")
+        counts = _per(canonical(guesses[pump])) if pump else ""
+        name = block.parameter("_".join(["fluid", *of, output]), "1e-4", f"1/s{counts}", least="0.0")
         which = "fluid" if len(fluids) == 1 else fluid
         which += f" with {pump}" if len(pumps) > 1 else ""
         block.term(f"{which} on {output}", output, f"{name}*{f'{pump}*' if pump else ''}({fluid} - {output})")

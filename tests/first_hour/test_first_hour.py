@@ -158,6 +158,21 @@ def test_the_first_model_counts_in_what_values_have_once_they_are_loaded(tmp_pat
     assert check_dimensions(model, channels) == []
 
 
+def test_the_gain_of_a_load_without_a_unit_is_a_rate(tmp_path: Path) -> None:
+    from discovery.experiment import load_experiment
+
+    rows = ["time,heater,boiler_temp"]
+    on = [k // 20 % 2 for k in range(120)]
+    heat = np.convolve(on, np.exp(-np.arange(120) / 15))[:120]
+    rows += [f"{k},{on[k]},{22 + heat[k]:.3f}" for k in range(120)]
+    (tmp_path / "shift.csv").write_text("\n".join(rows), "utf-8")
+    CliRunner().invoke(app, ["new", str(tmp_path / "boiler"), "--from", str(tmp_path / "shift.csv")])
+    experiment = load_experiment(tmp_path / "boiler" / "experiment.toml")
+    assert experiment.campaign.channels["heater"].unit == "1"
+    model = experiment.model_file("first_order")
+    assert model.parameters["gain_boiler_temp_heater"].unit == "K/s"
+
+
 def test_columns_that_say_nothing_stay_out(tmp_path: Path) -> None:
     for name, column in (("one", "extra"), ("two", "other")):
         rows = [f"{k},{k % 3},{20 + k / 9},24.3,7,{k % 5}" for k in range(30)]
