@@ -150,7 +150,7 @@ def _smallest(found: Search) -> str:
         "second_thermal_mass",
     ):
         claims = [c for c in scanned if c.hypothesis.effect.word == word]
-        seen = [c for c in claims if _size_is_known(c) and _visible(c) <= c.hypothesis.effect.amplitude.most]
+        seen = [c for c in claims if _size_is_known(c) and _visible(c) <= _largest(found, c.hypothesis)]
         if not seen:
             continue
         size, c = max(((_visible(c), c) for c in seen), key=lambda item: item[0])
@@ -173,6 +173,12 @@ def _smallest(found: Search) -> str:
 def _visible(claim: Score) -> float:
     """The size that would have been seen."""
     return 4.5 * abs(claim.size[0] / claim.t)
+
+
+def _largest(found: Search, h: Hypothesis) -> float:
+    """The largest size worth saying: 3 standard deviations of the logarithm above what is usual."""
+    slab = found.context.slab([h])
+    return min(h.effect.amplitude.most, float(slab.median[0] * slab.factor[0] ** 3))
 
 
 def _size_is_known(claim: Score) -> bool:

@@ -18,7 +18,6 @@ from discovery.design.question import (
     APART,
     CONFIRM,
     NOTHING_CLOSE,
-    _smallest,
     aim,
     ask,
     check_the_device,
@@ -32,7 +31,6 @@ from discovery.diagnosis.verdict import UNEXPLAINED, Verdict
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
 from discovery.effects.hypothesis import Hypothesis
-from discovery.evidence.bayes import Score
 from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.printed import printed
@@ -262,30 +260,6 @@ def test_large_sizes_are_written_out() -> None:
     sizes = re.findall(r" of [\d.e-]+ (\S+)", said)
     assert sizes == ["W/K", "W", "W", "W/K", "W/K"][: len(sizes)]
     assert "e+" not in said
-
-
-def test_a_size_without_a_unit_is_a_share() -> None:
-    """Of a model whose states are the errors, a second mass is a share of an error."""
-    errors = Model("errors", {}, {}, (), {name: parse("0.01*P_drive") for name in SEEN})
-    h = next(h for h in machine.claims(errors, "second_time_constant") if "E_Z" in h.shown)
-    seen = Score(h, 0.0, 2.0, (0.124,), 1.0, 0)
-    said = _smallest(cast(Search, SimpleNamespace(claims=[seen])))
-    assert said == "these recordings would have shown second_thermal_mass of 28 % at E_Z"
-    whole = replace(h.effect, amplitude=replace(h.effect.amplitude, most=1.0))
-    blind = Score(replace(h, effect=whole), 0.0, 2.0, (0.5,), 1.0, 0)  # it would have to be 113 %
-    assert "second_thermal_mass" not in _smallest(cast(Search, SimpleNamespace(claims=[blind])))
-
-
-def test_a_group_is_not_said_again_where_each_of_its_bodies_is() -> None:
-    motor, table, bed = machine.claims(model(), "friction_speed")
-    both = replace(motor, states=("motor", "table"))
-    unseen = Score(bed, 0.0, 0.0, (9.0,), 1.0, 0)
-    for shown, where in (
-        ((motor, table, both), "at motor; table"),
-        ((motor, both), "at motor; motor and table"),
-    ):
-        claims = [*(Score(h, 0.0, 2.0, (9.0,), 1.0, 0) for h in shown), unseen]
-        assert _smallest(cast(Search, SimpleNamespace(claims=claims))).endswith(where)
 
 
 def test_patterns_move_what_the_machine_has() -> None:
