@@ -41,6 +41,7 @@ from discovery.effects.catalogue import catalogue
 from discovery.effects.form import LEVEL
 from discovery.effects.hypothesis import Hypothesis
 from discovery.evidence.latent_force import alike, heat_over_time
+from discovery.models.dimensions import heat_unit
 from discovery.printed import undetermined
 from discovery.terms import names, parse, text
 
@@ -293,6 +294,7 @@ def _rms(residual: np.ndarray) -> float:
 
 
 def _location(d: Diagnosis) -> LocationDocument:
+    model = d.before.problem.model
     return LocationDocument(
         outputs=dict(d.location.outputs),
         states=dict(d.location.states),
@@ -311,6 +313,11 @@ def _location(d: Diagnosis) -> LocationDocument:
         unmodelled_heat_W={
             f.state: number(float(np.sqrt(np.mean(np.concatenate(list(f.heat.values())) ** 2))), 3)
             for f in d.forces
+        },
+        heat_units={
+            name: heat_unit(model, model.states[name])
+            for name in dict.fromkeys([*(w.state for w in d.location.windows), *(f.state for f in d.forces)])
+            if name in model.states
         },
     )
 

@@ -103,7 +103,7 @@ class Window(Strict):
     start_s: Number
     end_s: Number
     state: str
-    heat_W: Number  # noqa: N815 - the unit is part of the name
+    heat_W: Number = Field(description="in the unit of `heat_units`")  # noqa: N815 - a name that is kept
 
 
 class LocationDocument(Strict):
@@ -114,7 +114,10 @@ class LocationDocument(Strict):
     alike: list[list[str]] = Field(description="states at which missing heat looks the same in the readings")
     windows: list[Window]
     regime: str | None
-    unmodelled_heat_W: dict[str, Number]  # noqa: N815
+    unmodelled_heat_W: dict[str, Number] = Field(description="rms, in the unit of `heat_units`")  # noqa: N815
+    heat_units: dict[str, str] = Field(
+        {}, description="by state: of heat_W and unmodelled_heat_W; a state without heat capacity has a rate"
+    )
 
 
 class Gain(Strict):

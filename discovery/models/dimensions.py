@@ -68,7 +68,7 @@ def with_coefficient_units(model: Model, channels: Mapping[str, Channel]) -> Mod
             case Apply("*", (Name(coefficient), rest)) if coefficient in parameters:
                 state = model.states[term.into]
                 wanted, name = _entering(model, state)
-                rate = "W" if state.capacity else f"{differences(state.unit)}/{_clock(model, state)}"
+                rate = heat_unit(model, state)
                 if not _compare(term.expression, dimensions, wanted, name):
                     continue
                 of = unit_of(rest, units)
@@ -77,6 +77,11 @@ def with_coefficient_units(model: Model, channels: Mapping[str, Channel]) -> Mod
             case _:
                 pass
     return replace(model, parameters=parameters)
+
+
+def heat_unit(model: Model, state: State) -> str:
+    """The unit of what enters a state: W, or a rate of what has no heat capacity."""
+    return "W" if state.capacity else f"{differences(state.unit)}/{_clock(model, state)}"
 
 
 def _entering(model: Model, state: State) -> tuple[Dimension, str]:

@@ -103,15 +103,16 @@ def _prediction_chart(run: Run, recording: str, output: str, models: Sequence[st
 
 
 def _windows(run: Run, recording: str, scale: float) -> tuple[tuple[float, float, str], ...]:
-    found = (run.diagnosis or {}).get("location", {}).get("windows", [])
+    location = (run.diagnosis or {}).get("location", {})
     shades = []
-    for window in found:
+    for window in location.get("windows", []):
         if window.get("recording") == recording:
             heat, state = window.get("heat_W"), window.get("state")
+            unit = pretty_unit(location.get("heat_units", {}).get(state, "W"))
             why = (
                 "mismatch"
                 + (f" at {state}" if state else "")
-                + (f", {number(heat)} W" if heat is not None else "")
+                + (f", {number(heat)} {unit}" if heat is not None else "")
             )
             shades.append((window["start_s"] / scale, window["end_s"] / scale, why))
     return tuple(shades)

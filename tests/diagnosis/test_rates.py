@@ -75,6 +75,7 @@ def test_a_path_between_two_readings_has_a_rate_for_each() -> None:
     assert into["T_column"].value == pytest.approx(INTO_COLUMN, rel=0.1)
     (told,) = document(answer)["physics"]
     assert len(told["parameters"]) == len(told["expressions"]) == 2
+    assert document(answer)["location"]["heat_units"] == {"T_motor": "K/s", "T_column": "K/s"}
     assert answer.held_out["r3"].after < 1.1 * answer.held_out["r3"].floor
 
 

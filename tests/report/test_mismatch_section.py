@@ -28,6 +28,17 @@ def test_the_missing_physics_is_named_with_size_and_certainty(page: str) -> None
     assert shades == [[[4, 10, "mismatch at b_corpus, 81 W"]]]
 
 
+def test_a_span_at_a_state_without_heat_capacity_has_the_unit_of_its_rate(tmp_path: Path) -> None:
+    folder = sample.write_sample(tmp_path / "run")
+    path = folder / "diagnosis.json"
+    diagnosis = json.loads(path.read_text())
+    diagnosis["location"]["heat_units"] = {"b_corpus": "K/s"}
+    path.write_text(json.dumps(diagnosis))
+    page = write_report(folder).read_text("utf-8")
+    shades = [chart["shades"] for chart in sample.data_of(page)["charts"] if chart["key"] == "fit-E_Y0C"]
+    assert shades == [[[4, 10, "mismatch at b_corpus, 81 K/s"]]]
+
+
 def test_a_repair_that_unseen_recordings_contradict_is_said_first(tmp_path: Path) -> None:
     folder = sample.write_sample(tmp_path / "run")
     path = folder / "diagnosis.json"
