@@ -40,3 +40,15 @@ def test_rest_before_anything_moves_is_no_limit() -> None:
     rest = seen("monday", np.concatenate([np.zeros(20), warm]) + 25.0)
     others = [seen("tuesday", warm + 20.0), seen("friday", warm + 21.0)]
     assert list(_full_range([rest, *others], oven)) == []
+
+
+def test_the_smallest_value_of_an_input_may_be_that_at_idle() -> None:
+    """A motor that draws 0.44 A as often as it idles, and less on other days."""
+    rng = np.random.default_rng(5)
+    current = Channel("P", "heat load", "A", None, "held")
+    days = [seen(name, rng.uniform(0.1, 5.0, 400)) for name in ("monday", "tuesday")]
+    idles = seen("friday", np.maximum(rng.uniform(-1.0, 5.0, 400), 0.44))
+    [told] = _full_range([*days, idles], current)
+    assert told.do.startswith("its value at idle, or else a full range")
+    [other] = _full_range([*days, seen("friday", np.minimum(rng.uniform(0.1, 5.0, 400), 3.5))], current)
+    assert other.do == "a full range or a limit: widen it"

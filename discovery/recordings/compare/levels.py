@@ -144,7 +144,16 @@ def _full_range(recordings: Sequence[Seen], channel: Channel) -> Iterator[Findin
                     f"{flat[one.name, sign]:.0%} of its readings; elsewhere it goes "
                     f"{'higher' if sign > 0 else 'lower'} and never stays"
                 )
-                yield warning(one, channel, row, what, "a full range or a limit: widen it", "saturated", 2.0)
+                yield warning(one, channel, row, what, _why(channel, sign), "saturated", 2.0)
+
+
+def _why(channel: Channel, sign: float) -> str:
+    """What readings at the largest (`sign` 1) or smallest (-1) value may be. A current that idles is right;
+    no temperature idles.
+    """
+    if channel.is_input and channel.unit != "degC" and sign < 0:
+        return "its value at idle, or else a full range or a limit: widen it then"
+    return "a full range or a limit: widen it"
 
 
 def _piles_up(read: Array) -> bool:
