@@ -222,7 +222,8 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
     sizes = ", ".join(f"{_size(proof[r], rms[r], unit)} on {r}" for r in missed)
     reason = (
         "free runs on held-out recordings miss more than noise and the fit explain, from each start within "
-        f"its spread: rms {sizes}; something acts there that the recordings to fit do not show"
+        f"its spread: rms {sizes}; something acts there that the recordings to fit do not show, or the "
+        "recordings to fit are wrong (clock, units)"
     )
     word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
     return replace(verdict, word=word, reasons=(*_large(verdict), reason))

@@ -881,6 +881,7 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     other = unforeseen(nothing, {"r3": near, "r4": far}, "um")
     assert other.word == "unexplained"
     assert "rms 2.1 um (1 expected) on r4" in other.reasons[-1]
+    assert other.reasons[-1].endswith("or the recordings to fit are wrong (clock, units)")
     better = Improvement(2.1, 0.5, 0.8, 0.0, 0.0, {}, unsure=0.6)  # a repair whose names were withdrawn
     assert unforeseen(nothing, {"r4": better}, "um").word == "unexplained"
     named = said(WET, {"fluid_convection": 0.9})
