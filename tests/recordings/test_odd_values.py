@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from discovery.recordings import load_campaign
 from discovery.recordings.campaign import Channel
-from discovery.recordings.oddvalues import impossible_readings, odd_findings, odd_readings
+from discovery.recordings.oddvalues import impossible_readings, logger_words, odd_findings, odd_readings
 from tests.recordings.conftest import Write, found, with_column
 
 PROBE = Channel("z", "error", "um", None, "linear")
@@ -17,6 +17,13 @@ PROBE = Channel("z", "error", "um", None, "linear")
 def slow(seed: int = 1) -> NDArray[np.float64]:
     rng = np.random.default_rng(seed)
     return np.asarray(-150.0 * (1.0 - np.exp(-np.arange(200) / 60.0)) + rng.normal(0.0, 2.0, 200))
+
+
+@pytest.mark.parametrize("code", [-99.0, -127.0, 999.0, 9999.0])
+def test_a_code_far_from_all_readings_is_none(code: float) -> None:
+    read = np.linspace(20.0, 31.0, 60)
+    read[10:50:3] = code
+    assert logger_words(read).tolist() == list(range(10, 50, 3))
 
 
 @pytest.mark.parametrize("rows", [[70], [70, 71], [70, 71, 72], [40, 41, 90, 120, 121, 122]])
