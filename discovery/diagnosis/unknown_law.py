@@ -12,18 +12,23 @@ from dataclasses import replace
 from itertools import combinations_with_replacement
 from math import inf, log
 
+import numpy as np
+from numpy.typing import NDArray
+
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import left_out
 from discovery.diagnosis.refit import score
 from discovery.diagnosis.scan import attempt, in_play
-from discovery.diagnosis.scored import Scored, is_usual
+from discovery.diagnosis.scored import Scored, is_large, is_usual
 from discovery.effects.form import Amplitude, Effect
 from discovery.effects.hypothesis import Hypothesis
 from discovery.effects.places import TEMPERATURES
 from discovery.evidence.bayes import scan
 from discovery.printed import printed
 from discovery.terms import Apply, Expression, Name, Number, Term
+
+Array = NDArray[np.float64]
 
 _SIZE = "q_unknown_law"  # W where both inputs are largest
 _LAW = Effect(
@@ -109,10 +114,18 @@ def _law(h: Hypothesis) -> str:
 
 
 def _laws(context: Context) -> Iterator[Hypothesis]:
-    """Each product of two inputs, or the square of one, at each body; all share the odds of one effect."""
+    """Each product of two inputs, or the square of one, at each body; all share the odds of one effect. The
+    square of an input that is on or off is that input: heat that follows it is in the catalogue.
+    """
     channels, largest = context.campaign.channels, context.scene.largest
     inputs = [n for n in largest if channels[n].unit not in TEMPERATURES and n not in context.model.states]
-    pairs = list(combinations_with_replacement(inputs, 2))
+    grids = context.grids.values()
+    part = {n: np.concatenate([g.nodes[n] for g in grids]) / largest[n] for n in inputs}
+    pairs = [
+        pair
+        for pair in combinations_with_replacement(inputs, 2)
+        if not any(_is(part[pair[0]] * part[pair[1]], part[n]) for n in pair)
+    ]
     for one, other in pairs:
         flow: Expression = Name(_SIZE)
         for name in (one, other):
@@ -121,3 +134,8 @@ def _laws(context: Context) -> Iterator[Hypothesis]:
             term = Term(f"{_LAW.title}, {body}", body, flow, None, _LAW.word)
             odds = log(thresholds.ODDS) - log(len(pairs) * len(context.floor))
             yield Hypothesis(_LAW, (body,), (_SIZE,), (term,), channels=(one, other), log_odds=odds)
+
+
+def _is(law: Array, one: Array) -> bool:
+    """Whether a law (N,) differs from an input (N,) by no more than a usual law is off."""
+    return not is_large(float(np.linalg.norm(law - one) / np.linalg.norm(one)))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
 from discovery.diagnosis import thresholds
 from discovery.diagnosis.refit import score
-from discovery.diagnosis.unknown_law import instead
+from discovery.diagnosis.unknown_law import _laws, instead
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
 from discovery.terms import Term, parse
@@ -65,3 +67,13 @@ def test_a_coarse_model_is_told_the_law_that_it_lacks(law: str, unit: str, said:
     assert (one.off > thresholds.SHARE) is (said is not None)
     found = instead(context, one)
     assert (found is None) if said is None else (found or "").startswith(said)
+
+
+def test_the_square_of_a_switch_is_the_switch() -> None:
+    run = winding(1)
+    part = run.values["current"]
+    switch = (part > 3.0).astype(float)
+    for values, laws in ((part, 1), (switch, 0)):
+        seen = Campaign("coil", CHANNELS, {"r1": replace(run, values={**run.values, "current": values})})
+        context = context_of(seen, coil("heat*current", "W/A"), outputs=("T_coil",))
+        assert len(list(_laws(context))) == laws
