@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
@@ -25,7 +25,9 @@ from discovery.dynamics.sensitivity import moved_in_time
 from discovery.dynamics.system import evened, inputs_of, shifted, uncertain
 from discovery.fitting.noise import Noise
 from discovery.models import Model, Parameter, State, expanded
+from discovery.models.model import fed_with
 from discovery.recordings import Campaign
+from discovery.terms import evaluate, names, substitute
 
 Array = NDArray[np.float64]
 
@@ -246,7 +248,36 @@ def make_problem(
         else:
             systems.append(make_system(model, grid.shifted({}) if grid.offset or grid.late else grid))
     unknowns = _unknowns(model, systems, recordings, priors or {}, belief or {})
-    return Problem(model, tuple(systems), tuple(unknowns))
+    reach = _memory_ranges(systems, [n for n, c in campaign.channels.items() if c.unit in ("degC", "K")])
+    return Problem(model, tuple(systems), tuple(_within(u, reach) for u in unknowns))
+
+
+def _memory_ranges(systems: Sequence[System], warm: Collection[str]) -> dict[Key, tuple[float, float]]:
+    """By start of a memory of recorded inputs: from where to where it may be off. What it holds is a mean of
+    what the inputs were before, which is zero or what they are in some recording.
+
+    Args:
+        warm: temperatures, which may have been any before a recording.
+    """
+    found: dict[Key, tuple[float, float]] = {}
+    fed = fed_with(systems[0].model)
+    for name, followed in fed.items():
+        while fed.keys() & names(followed):
+            followed = substitute(followed, fed)
+        used = names(followed)
+        if not used or any(used - s.grid.samples.keys() for s in systems) or used & set(warm):
+            continue
+        series = [np.ravel(evaluate(followed, s.grid.nodes, memory=s.nodes).value) for s in systems]
+        every = np.concatenate([[0.0], *series])
+        for system, one in zip(systems, series, strict=True):
+            ends = float(every.min() - one[0]), float(every.max() - one[0])
+            found[name, system.grid.recording, True, False, False] = ends
+    return found
+
+
+def _within(u: Unknown, reach: Mapping[Key, tuple[float, float]]) -> Unknown:
+    low, high = reach.get(u.key, (-np.inf, np.inf))
+    return replace(u, low=max(u.low, low), high=min(u.high, high))
 
 
 def _unknowns(

@@ -211,7 +211,7 @@ def _read_in(model: Model, expression: Expression) -> tuple[str, Expression | No
     """The state that an output shows once everything that remembers has settled, and what it shows in
     addition, which no state changes (None: nothing); None where it shows none or more than one.
     """
-    memories = _fed_with(model)
+    memories = fed_with(model)
     while memories.keys() & names(expression):
         expression = substitute(expression, memories)
     parts = _addends(rewrite(rewrite(expression, _settled), _short))
@@ -223,7 +223,7 @@ def _read_in(model: Model, expression: Expression) -> tuple[str, Expression | No
     return bodies[0], reduce(lambda a, b: Apply("+", (a, b)), rest) if rest else None
 
 
-def _fed_with(model: Model) -> dict[str, Expression]:
+def fed_with(model: Model) -> dict[str, Expression]:
     """By memory of an expanded model: what it follows, and shows once it has settled."""
     found: dict[str, Expression] = {}
     for term in model.terms:
@@ -293,7 +293,7 @@ def with_settled_memories(model: Model) -> Model:
     """An expanded model whose memories start with what they are fed with, as expressions, unless they follow
     a state that begins in balance.
     """
-    states, fed = dict(model.states), _fed_with(model)
+    states, fed = dict(model.states), fed_with(model)
     for name in [n for n in states if n in fed and states[n].start is None]:
         starts = {s: state.start for s, state in states.items() if state.start is not None}
         start = rewrite(substitute(fed[name], starts), _settled)

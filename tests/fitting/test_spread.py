@@ -348,3 +348,18 @@ def test_a_hidden_mass_need_not_begin_as_warm_as_its_body() -> None:
         assert high is not None
         assert low < true < high
         assert high - low < 0.2 * true
+
+
+def test_what_a_memory_of_an_input_holds_lies_in_the_range_of_the_input() -> None:
+    """A heater began at -0.4 of its power, and its model met every reading."""
+    terms = (Term("heat", "T", parse("g*lag(lag(load, 300), 300)")), Term("air", "T", parse("h*(room - T)")))
+    warm = Term("wall", "T", parse("h*(lag(room, 900) - T)"))
+    lagging = replace(model(), terms=(*terms, warm))
+    time = np.arange(0.0, 1200.0, 30.0)
+    loads = {"a": np.where(time < 600, 10.0, 25.0), "b": np.where(time < 600, 25.0, 5.0)}
+    rooms = np.full(40, 23.0)
+    runs = [Recording(name, time, {"load": load, "room": rooms, "T": rooms}) for name, load in loads.items()]
+    problem = make_problem(lagging, campaign(*runs), ["a", "b"])
+    ranges = {(u.recording, u.low, u.high) for u in problem.unknowns if u.is_start and u.spread == "moved"}
+    of_load = {("a", -10.0, 15.0), ("b", -25.0, 0.0)}  # from zero to the largest load
+    assert ranges == of_load | {("a", -np.inf, np.inf), ("b", -np.inf, np.inf)}
