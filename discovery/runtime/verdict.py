@@ -9,7 +9,6 @@ from typing import Literal
 import numpy as np
 
 from discovery.diagnosis.thresholds import NAMED, ODDS, RIVAL, SUREST
-from discovery.diagnosis.verdict import by_chance
 
 Verdict = Literal[
     "nothing",
@@ -80,7 +79,8 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
     effects = [one for one in odds if one.is_new_physics]
     best, second, *_ = sorted((e for e in evidence if not e.is_new_physics), key=lambda one: -odds[one])
     effect = max(effects, key=lambda one: odds[one], default=None)
-    if effect and odds[effect] - max(odds[best], 0.0) >= by_chance(odds[effect], SURE):
+    # of two explanations alike, the evidence of one over the other varies as itself, not as what both explain
+    if effect and odds[effect] - max(odds[best], 0.0) >= SURE:
         if probability(odds, effect) >= NAMED:
             return "new physics", str(effect)
         others = _without(odds, effect)
@@ -88,7 +88,8 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
     if odds[best] < LEAST_ODDS:
         return "nothing", ""
     if odds[best] - odds[second] < RIVAL:
-        return "undecided", f"{best} or {second}"
+        first = sorted((best, second, *([effect] if effect else [])), key=lambda one: -odds[one])
+        return "undecided", f"{first[0]} or {first[1]}"
     if best.kind == "wear" or best.kind == "something else":
         return best.kind, ""
     if evidence[best] < SURE:

@@ -80,12 +80,12 @@ def test_the_figures_of_the_page_are_those_of_the_export(exported: Exported) -> 
     assert (float(said[1]), float(said[2])) == (round(min(rates), 2), round(max(rates), 2))
     assert ends == [4 * 3600, 2 * 3600, 300, 8 * 3600]
     start, moves = beginning(exported)
-    for words in ("about 20 h, because the slowest time constant is 6.6 h", "COLD"):
+    for words in ("about 17 h, because the slowest time constant is 5.6 h", "COLD"):
         assert words in start
     assert "0.81 um (E_Z0T)" in moves
     assert "1.4 um/m (E_A0C)" in moves
     for words in (
-        "about 20 h, because the slowest time constant is 6.6 h",
+        "about 17 h, because the slowest time constant is 5.6 h",
         "up to 0.81 um (the tilt: 1.4 um/m) in a tick of 10 s",
     ):
         assert words in " ".join(PAGE.split())

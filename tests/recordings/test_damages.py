@@ -37,7 +37,7 @@ def test_there_are_sixty_kinds_and_more() -> None:
 
 def test_what_is_not_found_does_no_harm() -> None:
     for one in (d for d in DAMAGES if d.name in NOT_FOUND):
-        assert harm(one) < 1.02  # times the held-out rms with sound recordings
+        assert harm(one) < 1.03  # times the held-out rms with sound recordings
 
 
 # every sixth here; all of them, with a table, by `python -m tests.recordings.damages` (5 min)

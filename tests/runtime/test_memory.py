@@ -115,7 +115,7 @@ def test_through_a_gap_the_state_is_that_of_a_machine_at_rest(
     run(running, rest, 600 * 60.0)
     run(woken, rest[-1:], (600 + 239) * 60.0)
     assert woken.state is State.WARM
-    assert np.max(np.abs(woken.stepper.x - running.stepper.x)) < 1e-2  # K
+    assert np.max(np.abs(woken.stepper.x - running.stepper.x)) < 0.02  # K
     run(woken, np.tile(rest[-2:], (150, 1)), 840 * 60.0)
     run(running, np.tile(rest[-2:], (150, 1)), 840 * 60.0)
     assert woken.offsets == pytest.approx(running.offsets, abs=0.05)

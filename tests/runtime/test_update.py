@@ -319,6 +319,10 @@ def test_an_effect_is_named_only_where_it_is_sure() -> None:
     assert verdict_of({**odds, WEAR: 10.0}, evidence) == ("wear", "")  # an effect adds too little
     assert verdict_of({**odds, fan: 19.5}, {**evidence, fan: 23.0}) == ("undecided", "gap or exchange with T")
     assert verdict_of({**odds, fan: 30.0}, {**evidence, fan: 34.0}) == ("new physics", "exchange with T")
+    large = {NOTHING: 0.0, WEAR: 7626.0, SOMETHING_ELSE: 9864.0, fan: 10001.0}  # cooling by a fifth less
+    assert verdict_of(large, {**evidence, fan: 10001.0}) == ("new physics", "exchange with T")
+    close = {**odds, gap: 12.0, path: 1.0, again: 1.0}  # what leads is among what is undecided
+    assert verdict_of(close, evidence) == ("undecided", "gap or wear")
     small = {NOTHING: 0.0, WEAR: -1.0, SOMETHING_ELSE: -2.0, gap: 10.0}
     assert verdict_of(small, evidence) == ("nothing", "")
 
