@@ -87,12 +87,18 @@ def sentences(fit: Fit, is_right: bool = True) -> list[str]:
 
 def beyond(fit: Fit) -> list[str]:
     """A sentence for each input that every recording has late, or early, by more than a logger makes."""
-    return [
-        f"{name} would be logged {_those(late)}, more than the interval of its samples: a dead time, or "
-        "another body between the input and what is read, looks the same"
-        for name, late in _found(fit, 1.0, apart=True).items()
-        if len(late) == len(fit.trajectories) and (max(late.values()) < 0 or min(late.values()) > 0)
-    ]
+    said = []
+    for name, late in _found(fit, 1.0, apart=True).items():
+        is_early, is_late = max(late.values()) < 0, min(late.values()) > 0
+        if len(late) == len(fit.trajectories) and (is_early or is_late):
+            alike = (
+                "a dead time, or another body on the way to what is read," if is_early else "a wrong clock"
+            )
+            said.append(
+                f"{name} would be logged {_those(late)}, more than the interval of its samples: {alike} "
+                "looks the same"
+            )
+    return said
 
 
 def _found(fit: Fit, least: float, apart: bool = False) -> dict[str, dict[str, float]]:

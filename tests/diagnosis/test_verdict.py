@@ -794,6 +794,16 @@ def test_a_jump_that_no_flow_makes_stands_next_to_what_no_effect_explains(
         assert any(what in text for text in answer.reasons)
 
 
+@pytest.mark.parametrize(("gain", "word"), [(28.0, "no mismatch"), (50.0, "unexplained")])
+def test_pulses_in_most_recordings_may_come_by_chance(gain: float, word: str) -> None:
+    """Two of them have to explain twice what one has to: the noise of an intact coil has pulses, too."""
+    pulses = tuple(claim("unmeasured_heat", recording=r) for r in ("r1", "r2"))
+    models = [Model(pulses, gain), *(Model((one,), gain / 2) for one in pulses), Model((), 0.0)]
+    found = said(Tried(models), {"unmeasured_heat": 0.98}, World(("r1", "r2", "r3")))
+    assert found.word == word
+    assert any("would come in 2 of 3 recordings" in reason for reason in found.reasons)
+
+
 def test_a_law_that_always_acts_needs_no_model_that_is_nearly_right() -> None:
     found = Tried([Model((FLUID,), 50.0, off=0.24), Model((), 0.0)])
     assert said(found, {"fluid_convection": 0.9}).word == "missing physics"

@@ -17,7 +17,7 @@ from discovery.diagnosis.selection import Search
 from discovery.diagnosis.thresholds import SHORT
 from discovery.dynamics import make_grid
 from discovery.effects.catalogue import catalogue
-from discovery.evidence.late import perhaps_late, sentences
+from discovery.evidence.late import beyond, perhaps_late, sentences
 from discovery.fitting import Noise
 from discovery.models import Model, Parameter, State
 from discovery.recordings import Campaign, Channel, Recording
@@ -154,6 +154,34 @@ def test_a_shift_by_more_than_a_logger_makes_may_be_a_dead_time() -> None:
     assert sentences(fit) == [
         "gas is logged 18 s early in a, 8 s early in b; the fit allows for it, and a dead time looks the same"
     ]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"),
+    [
+        (
+            (-18.0, -16.0),
+            "gas would be logged 18 s early in a, 16 s early in b, more than the interval of its ",
+        ),
+        ((14.0, 13.0), "gas would be logged 14 s late in a, 13 s late in b, more than the interval of its "),
+        ((-18.0, -8.0), None),  # one of them is what a logger makes
+        ((-18.0, 16.0), None),
+        ((-9.2, -9.2), None),  # within three standard errors of an interval
+    ],
+)
+def test_every_recording_late_by_more_than_an_interval_is_no_logger(
+    seconds: tuple[float, float], said: str | None
+) -> None:
+    late = [SimpleNamespace(name="gas", recording=r, is_late=True, prior=(0.0, 9.0)) for r in ("a", "b")]
+    fit: Any = SimpleNamespace(
+        problem=SimpleNamespace(unknowns=late),
+        theta=seconds,
+        standard_errors=[0.1, 0.1],
+        trajectories=[None, None],
+    )
+    found = beyond(fit)
+    assert [text.partition("samples")[0] for text in found] == ([said] if said else [])
+    assert all(("dead time" in text) == (seconds[0] < 0) for text in found)
 
 
 def heavy(seed: int) -> Recording:
