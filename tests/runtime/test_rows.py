@@ -131,7 +131,7 @@ def test_a_run_tells_what_it_did(model_file: object, exported: Exported) -> None
     done = CliRunner().invoke(app, command, input=rows(middle, [0.0, 60.0, 120.0, 30.0, 180.0]))
     assert done.exit_code == 0, done.stderr
     assert "1 row was left out: 1 out of order (the first in line 5)" in done.stderr
-    assert done.stderr.count("a cold start settles after about 20 h") == 1
+    assert done.stderr.count("a cold start settles after about 17 h") == 1
     assert "in a tick of 10 s an offset moves by at most " in done.stderr
     refused = CliRunner().invoke(app, command, input=rows(middle, [0.0]).replace("\n0,", "\nnoon,"))
     assert refused.exit_code == 1

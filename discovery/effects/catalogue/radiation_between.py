@@ -11,7 +11,7 @@ from discovery.effects.form import Amplitude, Effect, Example
 
 EFFECT = Effect(
     word="radiation",
-    title="Radiation",
+    title="Radiation from one body to another",
     group="air and structure",
     place="link",
     formula="A_rad*5.67e-8*((other + 273.15)**4 - (body + 273.15)**4)",
