@@ -75,17 +75,17 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
     others = [n.hypothesis for n in candidates if n not in named]
     alone = _alone(context, found, answer, named)
 
+    # of the effects without a name, all together: more than each of them may explain by chance
+    more = _is_more(answer.evidence - alone, thresholds.SHORT * max(len(others), 1))
+
     @cache
     def acts() -> bool:
-        """Whether the effects without a name, all together, explain more than each of them may by chance, and
-        improve free runs outside the fit.
-        """
-        more = _is_more(answer.evidence - alone, thresholds.SHORT * max(len(others), 1))
+        """Whether they explain more, and improve free runs outside the fit."""
         return more and _supports(together_left_out(context, answer, others))
 
-    # what no event can be, or does not improve free runs outside the fit, is not lacking either
+    # what does not improve free runs outside the fit is not lacking either, nor are events that are none
+    nothing = {*(() if more else refused), *(idle if idle and not acts() else ())}
     withheld = {**refused, **idle}
-    nothing = set(withheld) if withheld and not acts() else set[Key]()
     reasons = [*dict.fromkeys(text for key, text in withheld.items() if key not in nothing)]
     # a law has no name: it matters only where a name may stand for it
     lacking = (found.baseline, answer) if named else ()
