@@ -124,7 +124,7 @@ def _laws(context: Context) -> Iterator[Hypothesis]:
     pairs = [
         pair
         for pair in combinations_with_replacement(inputs, 2)
-        if not any(_is(part[pair[0]] * part[pair[1]], part[n]) for n in pair)
+        if not any(_is_same(part[pair[0]] * part[pair[1]], part[n]) for n in pair)
     ]
     for one, other in pairs:
         flow: Expression = Name(_SIZE)
@@ -136,6 +136,6 @@ def _laws(context: Context) -> Iterator[Hypothesis]:
             yield Hypothesis(_LAW, (body,), (_SIZE,), (term,), channels=(one, other), log_odds=odds)
 
 
-def _is(law: Array, one: Array) -> bool:
+def _is_same(law: Array, one: Array) -> bool:
     """Whether a law (N,) differs from an input (N,) by no more than a usual law is off."""
     return not is_large(float(np.linalg.norm(law - one) / np.linalg.norm(one)))

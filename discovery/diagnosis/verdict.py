@@ -80,10 +80,10 @@ def decide(context: Context, found: Search, posterior: Posterior) -> Verdict:
 
     @cache
     def acts() -> bool:
-        """Whether they explain more, and improve free runs outside the fit."""
+        """Whether the effects without a name explain more, and improve free runs outside the fit."""
         return more and _supports(together_left_out(context, answer, others))
 
-    # what does not improve free runs outside the fit is not lacking either, nor are events that are none
+    # what physics forbids is not lacking where it explains no more than chance, nor is what does not act
     nothing = {*(() if more else refused), *(idle if idle and not acts() else ())}
     withheld = {**refused, **idle}
     reasons = [*dict.fromkeys(text for key, text in withheld.items() if key not in nothing)]
