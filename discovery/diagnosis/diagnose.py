@@ -250,10 +250,10 @@ def diagnose(
 
     verdict = idle(found, verdict, judged.each)
     verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out, judged.fit)
-    if not verdict.named and after is not None:
+    verdict = unforeseen(verdict, judged.held_out, unit)
+    if not verdict.named:
         after = None
     in_fit = [h for h in hung if h.recording in fit]
-    verdict = unforeseen(verdict, judged.held_out, unit)
     verdict = not_of_a_logger(verdict, late.beyond(found.baseline.fit))
     verdict = wrong_readings(verdict, len(context.outliers), len(in_fit))
     law = instead(context, verdict.answer) if verdict.word == UNEXPLAINED else None

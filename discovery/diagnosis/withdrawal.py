@@ -16,6 +16,7 @@ from discovery.fitting import Fit
 from discovery.printed import printed
 
 FITTED = "the recordings to fit"
+NEARLY_RIGHT = "an event or a fault can only be recognised with a model that is nearly right"
 SMALL = "what the model lacks is small: unknown heat at any body explains no more than it may by chance"
 
 
@@ -183,7 +184,7 @@ def unfinished(
         if not verdict.named
         else f"the effects that are sure enough leave more than they explain: {missed}"
         if firm
-        else f"an event or a fault can only be recognised with a model that is nearly right: {missed}"
+        else f"{NEARLY_RIGHT}: {missed}"
     )
     return replace(
         verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=(reason, *_large(verdict))
@@ -213,7 +214,9 @@ def _size(run: Improvement, rms: float, unit: str) -> str:
 
 def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) -> Verdict:
     """The verdict where unseen recordings show what the recordings to fit do not: free runs miss their
-    readings by more than noise and the uncertainty of the parameters make likely.
+    readings by more than noise and the uncertainty of the parameters make likely. Names of laws stay: what
+    the recordings to fit prove, holds there. Those of events and faults do not, for the model is not nearly
+    right.
     """
     rms = {run: i.judged[1 if verdict.named else 0] for run, i in proof.items()}
     missed = [run for run, i in proof.items() if _misses(i, rms[run])]
@@ -225,8 +228,11 @@ def unforeseen(verdict: Verdict, proof: Mapping[str, Improvement], unit: str) ->
         f"its spread: rms {sizes}; something acts there that the recordings to fit do not show, or the "
         "recordings to fit are wrong (clock, units)"
     )
-    word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
-    return replace(verdict, word=word, reasons=(*_large(verdict), reason))
+    if all(n.is_firm for n in verdict.named):
+        word = UNEXPLAINED if verdict.word == NO_MISMATCH else verdict.word
+        return replace(verdict, word=word, reasons=(*_large(verdict), reason))
+    reasons = (f"{NEARLY_RIGHT}: {reason}", *_large(verdict))
+    return replace(verdict, word=UNEXPLAINED, named=(), candidates=verdict.named, reasons=reasons)
 
 
 def not_of_a_logger(verdict: Verdict, said: Sequence[str]) -> Verdict:

@@ -899,6 +899,12 @@ def test_what_only_unseen_recordings_show_is_unexplained() -> None:
     kept = unforeseen(named, {"r4": far}, "um")
     assert (kept.word, kept.named) == (named.word, named.named)
     assert "held-out recordings" in kept.reasons[-1]
+    # two columns of one recording exchanged: an offset of 74 K in the other, and an unseen one is missed
+    fault = said(Tried([Model((OFFSET,), 50.0), Model((), 0.0)]), {"sensor_offset": 0.98})
+    withdrawn = unforeseen(fault, {"r4": far}, "um")
+    assert (withdrawn.word, withdrawn.named, withdrawn.candidates) == ("unexplained", (), fault.named)
+    assert withdrawn.reasons[0].startswith("an event or a fault can only be recognised with a model")
+    assert unforeseen(fault, {"r4": near}, "um") is fault
 
 
 def test_names_that_leave_more_than_they_explain_are_withdrawn() -> None:
