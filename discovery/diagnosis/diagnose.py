@@ -228,6 +228,7 @@ def diagnose(
     forces = latent_forces(found.baseline.seen, in_play(context, found.baseline)[-1], context.floor)
     free_heat = forces[0].gain if forces and not chances.best.forced else inf  # else it explains most of all
     verdict = small(found, decide(context, found, chances), free_heat)
+    decided = verdict
     read = [r for r in held_out if not campaign.unread([r], outputs)]
     every, unit = list(range(len(outputs))), unit_of(campaign, outputs)
     while True:
@@ -248,7 +249,7 @@ def diagnose(
         fit_of_all = repaired(context, answer, answer.hypotheses, model, seen) if some else None
         return trial.fitted(fit_of_all, judges) if fit_of_all else None
 
-    verdict = idle(found, verdict, judged.each)
+    verdict = idle(found, verdict, judged.each, withdrawn=len(verdict.named) < len(decided.named))
     verdict = refuted(unfinished(verdict, judged.fit, unit, whole), judged.held_out, judged.fit)
     verdict = unforeseen(verdict, judged.held_out, unit)
     if not verdict.named:

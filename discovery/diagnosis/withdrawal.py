@@ -20,17 +20,22 @@ NEARLY_RIGHT = "an event or a fault can only be recognised with a model that is 
 SMALL = "what the model lacks is small: unknown heat at any body explains no more than it may by chance"
 
 
-def idle(found: Search, verdict: Verdict, runs: Mapping[str, Improvement]) -> Verdict:
+def idle(
+    found: Search, verdict: Verdict, runs: Mapping[str, Improvement], withdrawn: bool = False
+) -> Verdict:
     """No name where what was named does too little for free runs, on average over the recordings in which it
     may act: two hours of heat do nothing for the others. Logarithms of the rms are averaged: one recording of
     another machine does not drown the rest.
+
+    Args:
+        withdrawn: whether other names were withdrawn before. What they explain has no name then.
     """
     lower = _lower(i for run, i in runs.items() if _acts(verdict, run))
     if not verdict.named or lower >= 0.5 * thresholds.MATTERS**2:
         return verdict
     names = " and ".join(n.hypothesis.stated for n in verdict.named)
     reason = f"{names}: {_does(lower)}"
-    word = UNEXPLAINED if coarse(found) else NO_MISMATCH
+    word = UNEXPLAINED if withdrawn or coarse(found) else NO_MISMATCH
     reasons = dict.fromkeys((reason, *(coarse(found) or unrecorded(found)), *verdict.reasons))
     return replace(verdict, word=word, named=(), candidates=(), reasons=tuple(reasons))
 

@@ -840,6 +840,9 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     assert (
         "about 10 % of what flows" in idle(cast(Any, heated), named, {"r1": little, "r2": little}).reasons[1]
     )
+    # grease that churns after each start: thinner oil lost its name at the end of its range, this one next
+    left = idle(cast(Any, WET), named, {"r1": little, "r2": little}, withdrawn=True)
+    assert (left.word, left.named) == ("unexplained", ())
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
     assert idle(cast(Any, far), named, {"r1": little, "r2": little}).word == "unexplained"
 
