@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context, with_worse
 from discovery.diagnosis.scored import Scored, is_large, under_noise_of
 from discovery.effects.hypothesis import Hypothesis
@@ -53,7 +54,7 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
     """Outputs by which effects are judged in free runs: what shows a coarse body alone says nothing of
     effects that act elsewhere, as long as other outputs are read.
     """
-    coarse = set(coarse_at(answer))
+    coarse = {*coarse_at(answer), *heated_at(answer)}
     every = list(range(len(context.outputs)))
     shown = [names(context.model.outputs.get(name, Name(name))) for name in context.outputs]
     apart = {context.outputs[y] for y in every if shown[y] and shown[y] <= coarse}
@@ -64,10 +65,20 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
 
 def sentences(answer: Scored) -> list[str]:
     """What is said of each body that is off by more than the others, and than is usual."""
-    return [
+    flows = [
         f"the flows at {state} are wrong by about {100 * share:.0f} %, those elsewhere by "
         f"{100 * answer.noise.share:.0f} %: something acts at {state} that no effect explains"
         for state, share in coarse_at(answer).items()
+    ]
+    return flows + of_heat(answer)
+
+
+def of_heat(answer: Scored) -> list[str]:
+    """What is said of each body with more heat that nobody records than is usual, and than the others."""
+    return [
+        f"heat that the model does not give is about {100 * share:.0f} % of what flows at {state}, more than "
+        "elsewhere and than in most machines: something acts there that no effect explains"
+        for state, share in heated_at(answer).items()
     ]
 
 
@@ -76,3 +87,13 @@ def coarse_at(answer: Scored) -> dict[str, float]:
     noise = answer.noise
     each = {state: share for state, (_, share) in (noise.force or {}).items()}
     return {state: share for state, share in each.items() if is_large(share) and share > noise.share}
+
+
+def heated_at(answer: Scored) -> dict[str, float]:
+    """Share that heat which nobody records is of the flows of each body, where it is more than usual and than
+    at the others.
+    """
+    setting = answer.setting
+    above = {state: level for state, level in setting.levels.items() if level > setting.level}
+    each = {state: thresholds.FLOOR * level for state, level in above.items()}
+    return {state: share for state, share in each.items() if is_large(share)}

@@ -53,7 +53,7 @@ def describe(context: Context, current: Scored, force: Force) -> Description | N
     """The best short formula for the heat of a force; None when no term adds evidence."""
     bodies = [_read(t, force.state) for t in current.fit.trajectories]
     library = _library(context, current, force.state, np.concatenate(bodies))
-    setting = current.settings[current.best]
+    setting = current.setting
     columns = []
     for trajectory, body in zip(current.fit.trajectories, bodies, strict=True):
         env = {**trajectory.at_ends(), force.state: interleaved(body[:-1], body[1:])}

@@ -263,7 +263,7 @@ def diagnose(
     further += [_stood_still(h, campaign) for h in hung]
     stands_on = verdict.answer if verdict.named else found.baseline
     further += _reasons(context, verdict, stands_on, read, shown.held_out, effects, mine)
-    verdict = replace(verdict, reasons=(*verdict.reasons, *further))
+    verdict = replace(verdict, reasons=tuple(dict.fromkeys((*verdict.reasons, *further))))
     tell("locating")
     # what changes an output only has no curve of heat
     heats = [] if chances.best.forced and not chances.best.forced_state else forces
@@ -295,7 +295,7 @@ def _with_coarse_bodies(found: Search) -> Search:
     """The search with bodies that may be off by more than the others, where its best model shows some: they
     hide nothing as long as both this and the model without effects are off by no more than usual.
     """
-    if all(is_usual(one.settings[one.best]) for one in (found.baseline, found.best)):
+    if all(is_usual(one.setting) for one in (found.baseline, found.best)):
         return found
     other = with_coarse_bodies(found.context, found.best)
     return found if other is found.context else found.under(other)
@@ -384,7 +384,7 @@ def _reasons(
     said += not_offered(context.model, context.scene, effects)
     said += [one.sentence() for one in mine if not one.named]
     said += gaps.sentences({run: grid.silent for run, grid in context.grids.items()})
-    is_right = verdict.word != UNEXPLAINED and is_usual(stands_on.settings[stands_on.best])
+    is_right = verdict.word != UNEXPLAINED and is_usual(stands_on.setting)
     # if it is not, what a fit finds of its inputs may stand for what is missing
     said += late.sentences(stands_on.fit, is_right)
     return said + noisy.sentences(stands_on.fit, stands_on.noise) if is_right else said

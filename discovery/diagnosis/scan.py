@@ -76,7 +76,7 @@ def inside(context: Context, current: Scored) -> Whitened | None:
     first order only a body that is alive shows that both are missing.
     """
     problem = current.fit.problem
-    begins = not current.hypotheses and not is_usual(current.settings[current.best])
+    begins = not current.hypotheses and not is_usual(current.setting)
     far = thresholds.MISSED if begins else inf
     held = {
         k: u.start
@@ -137,7 +137,7 @@ def in_play(context: Context, current: Scored) -> list[Setting]:
     """Noise settings for the scan: the most likely one, and one with little process noise and no form error,
     because these may have absorbed the missing physics.
     """
-    best = current.settings[current.best]
+    best = current.setting
     kept = best.place[: AXES.index("share")]
     other = context.settings.at((*kept, *(0 for _ in best.place[len(kept) :])))
     return [best] if other.place == best.place else [best, other]
@@ -173,5 +173,5 @@ def _noises(context: Context, current: Scored) -> list[Noise]:
     """Noises to refit under: the most likely one, and the usual one where that is larger than usual, because
     much process noise explains any path of a model and holds a fit where it is.
     """
-    coarse = not is_usual(current.settings[current.best])
+    coarse = not is_usual(current.setting)
     return [current.noise, context.usual] if coarse else [current.noise]

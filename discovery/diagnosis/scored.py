@@ -102,9 +102,14 @@ class Scored:
         return int(np.argmax(self.levels))
 
     @property
+    def setting(self) -> Setting:
+        """The noise setting that is most likely."""
+        return self.settings[self.best]
+
+    @property
     def noise(self) -> Noise:
         """The noise that is most likely."""
-        return self.settings[self.best].noise
+        return self.setting.noise
 
     @property
     def coarse(self) -> bool:
@@ -129,12 +134,12 @@ class Scored:
     @property
     def off(self) -> float:
         """Share of the flows by which the model is wrong under the most likely noise."""
-        return _off_by(self.settings[self.best])
+        return _off_by(self.setting)
 
     @property
     def unrecorded(self) -> float:
         """Heat that nobody records under the most likely noise, as a share of what flows."""
-        return _unrecorded(self.settings[self.best])
+        return _unrecorded(self.setting)
 
     def level(self, k: int) -> float:
         """Log marginal likelihood under one noise setting."""
@@ -341,8 +346,8 @@ def _off_by(setting: Setting) -> float:
 
 
 def _unrecorded(setting: Setting) -> float:
-    """Heat that nobody records, as a share of what flows."""
-    return setting.level * thresholds.FLOOR
+    """Heat that nobody records, as a share of what flows, where there is most."""
+    return max(setting.level, *setting.levels.values(), 0.0) * thresholds.FLOOR
 
 
 def with_force(context: Context, one: Scored, state: str, goal: float = -inf) -> Scored:

@@ -75,7 +75,7 @@ class Search:
         """
         self._settled(self.grow().best)
         for first in self._as_likely():
-            coarse = not is_usual(self.best.settings[self.best.best])
+            coarse = not is_usual(self.best.setting)
             if coarse and not first.keys <= self.best.keys:
                 self._settled(first)
         for one in (*self._by_itself(), *self._for_several()):

@@ -53,7 +53,7 @@ def with_law(context: Context, one: Scored, goal: float = inf) -> list[Scored]:
     offered = list(_laws(context))
     if not offered:
         return []
-    best, *_ = scan(one.seen, [one.settings[one.best]], offered, context.slab(offered)).claims
+    best, *_ = scan(one.seen, [one.setting], offered, context.slab(offered)).claims
     h = best.hypothesis
     sizes = dict(zip(h.amplitudes, best.size, strict=True))
     if best.odds <= 0:
@@ -92,12 +92,12 @@ def _made_usual(context: Context, one: Scored) -> tuple[Scored, Hypothesis] | No
     Large process noise and form errors explain any law. So laws are scored as if there were little of them.
     """
     offered = list(_laws(context))
-    if is_usual(one.settings[one.best]) or not offered:
+    if is_usual(one.setting) or not offered:
         return None
     found = scan(one.seen, in_play(context, one), offered, context.slab(offered))
     claims = [*found.claims[:1], *found.quiet[:1]]
     tries = [(attempt(context, one, one.hypotheses, c), c.hypothesis) for c in claims if c.odds > 0]
-    enough = [(m, h) for m, h in tries if m and is_usual(m.settings[m.best]) and m.off < one.off]
+    enough = [(m, h) for m, h in tries if m and is_usual(m.setting) and m.off < one.off]
     return max(enough, key=lambda pair: pair[0].evidence, default=None)
 
 

@@ -42,6 +42,7 @@ class Setting:
     log_weight: float
     level: float  # of the heat that nobody records
     place: Place  # on the grid of jitters, noisy inputs, slow noises, levels, shares, forms, times, coarser
+    levels: Mapping[str, float] = field(default_factory=dict)  # of each state that is coarser than the others
 
     @property
     def is_plain(self) -> bool:
@@ -104,7 +105,8 @@ class Settings:
             heat_time=part * self.white.heat_time,
         )
         weights = (log(a[k][1] / sum(w for _, w in a)) for a, k in zip(self.axes, place, strict=True))
-        return Setting(noise, sum(weights), level, place)
+        levels = {s: self._up(place, "level", n) for s, n in bodies.items()}
+        return Setting(noise, sum(weights), level, place, levels)
 
     def _above(self, place: Place, state: str, steps: int) -> tuple[float, float]:
         """Heat and share of a state that is coarser by some steps."""

@@ -106,7 +106,8 @@ def test_a_lag_of_a_coarse_body_is_judged_by_what_it_shows() -> None:
     shown = {"motor": parse("motor"), "plate": parse("plate")}
     context = cast(Context, SimpleNamespace(outputs=("motor", "plate"), model=SimpleNamespace(outputs=shown)))
     noise = SimpleNamespace(share=0.02, force={"motor": (1.0, 0.25), "plate": (1.0, 0.02)})
-    answer = cast(Scored, SimpleNamespace(noise=noise))
+    setting = SimpleNamespace(level=1.0, levels={"motor": 2.0})
+    answer = cast(Scored, SimpleNamespace(noise=noise, setting=setting))
 
     def lag(output: str) -> Hypothesis:
         return cast(Hypothesis, SimpleNamespace(states=(), shown={output: parse("0")}))

@@ -63,6 +63,7 @@ class Model:
     off: float = thresholds.SHARE
     unrecorded: float = thresholds.FLOOR
     wrong: tuple[tuple[str, float], ...] = ()  # bodies whose flows are wrong by more than usual
+    heated: tuple[tuple[str, float], ...] = ()  # level of the heat that nobody records, of coarser bodies
     abrupt: bool = False  # its faults are jumps that no flow makes
 
     @property
@@ -76,6 +77,10 @@ class Model:
     @property
     def noise(self) -> Any:
         return SimpleNamespace(share=0.02, force={state: (0.0, share) for state, share in self.wrong})
+
+    @property
+    def setting(self) -> Any:
+        return SimpleNamespace(level=1.0, levels=dict(self.heated))
 
     @property
     def fit(self) -> Any:
@@ -843,6 +848,11 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     # grease that churns after each start: thinner oil lost its name at the end of its range, this one next
     left = idle(cast(Any, WET), named, {"r1": little, "r2": little}, withdrawn=True)
     assert (left.word, left.named) == ("unexplained", ())
+    # the jacket of a roaster whose flap opens when it is hot: all that it does is heat of one body
+    jacket = said(Tried([Model((), 0.0, heated=(("jacket", 5.0),))]), {})
+    assert jacket.word == "unexplained"
+    assert "about 10 % of what flows at jacket" in jacket.reasons[0]
+    assert said(Tried([Model((), 0.0, heated=(("jacket", 2.0),))]), {}).word == "no mismatch"
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
     assert idle(cast(Any, far), named, {"r1": little, "r2": little}).word == "unexplained"
 

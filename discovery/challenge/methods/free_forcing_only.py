@@ -16,7 +16,7 @@ FIRES = 9.0  # log evidence of free heat at the body where it explains most
 def free_forcing_only(problem: Problem) -> Answer:
     """`unexplained` with place and windows where free heat at some body adds evidence."""
     context, baseline = problem.context, problem.baseline
-    found = latent_forces(baseline.seen, baseline.settings[baseline.best], context.floor)
+    found = latent_forces(baseline.seen, baseline.setting, context.floor)
     fires = bool(found) and found[0].gain > FIRES
     verdict = Verdict(UNEXPLAINED if fires else NO_MISMATCH, baseline, (), (), ())
     place = locate(context, baseline, verdict, Posterior((baseline,), np.zeros((1, 1))), found)
