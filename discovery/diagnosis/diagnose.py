@@ -197,7 +197,7 @@ def diagnose(
     outputs = tuple(n for n in outputs if n in model.outputs or n in model.states)
     if not outputs:
         raise UserError(f"model '{model.name}' predicts no measured channel; name one under [outputs]")
-    if what := campaign.unread(fit, outputs):
+    if what := campaign.unread_to_fit(fit, outputs):
         raise UserError(what)
     campaign, hung = without_hung(campaign, outputs)
     own = {e.word for e in effects}

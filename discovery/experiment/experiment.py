@@ -204,7 +204,7 @@ def _check(path: Path, form: ExperimentForm, campaign: Campaign, outputs: Collec
     for name in outputs:
         if name not in measured:
             raise _mistake(path, ("outputs",), f"'{name}' is no measured channel; {suggest(name, measured)}")
-    if what := campaign.unread(form.fit, outputs):
+    if what := campaign.unread_to_fit(form.fit, outputs):
         raise _mistake(path, ("fit",), what)
     for model, entry in form.models.items():
         key = ("models", model)

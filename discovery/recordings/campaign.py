@@ -102,6 +102,11 @@ class Campaign:
             f"no reading of {' or '.join(outputs)} in {', '.join(recordings)}; name recordings that hold some"
         )
 
+    def unread_to_fit(self, recordings: Collection[str], outputs: Collection[str]) -> str:
+        """The same where one of them holds no reading: a model cannot be fitted to it."""
+        lost = [r for r in recordings if self.unread([r], outputs)]
+        return self.unread(lost, outputs) if lost else ""
+
 
 def load_campaign(path: str | os.PathLike[str], only: Collection[str] | None = None) -> Campaign:
     """Read a campaign file and its recordings.

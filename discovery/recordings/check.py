@@ -152,7 +152,8 @@ def _recording_findings(
     print_of = fingerprint(columns.time, [v for c, v in values.items() if channels[c].measured])
     whole = None
     if columns.runs_forward and len(values) == len(channels):
-        plausible = {c: _plausible(channels[c], v) for c, v in values.items()}
+        read = {c: v for c, v in values.items() if np.isfinite(v).any()}
+        plausible = {c: _plausible(channels[c], v) for c, v in read.items()}
         time = columns.time - columns.time[0]
         whole = Seen(name, file, time, plausible, columns.lines, frozenset(recording.set))
     return findings, print_of, whole

@@ -36,6 +36,8 @@ def test_recordings_without_readings_are_refused_as_those_of_an_experiment() -> 
     runs = [unread(simulated(seed), *SEEN) for seed in (1, 2)]
     with pytest.raises(UserError, match=r"no reading of E_Y or E_Z or E_R in r1, r2; name recordings"):
         diagnose(model(), campaign(*runs), ["r1", "r2"])
+    with pytest.raises(UserError, match=r"no reading of E_Y or E_Z or E_R in r2; name recordings"):
+        diagnose(model(), campaign(simulated(1), runs[1]), ["r1", "r2"])
 
 
 def test_an_unseen_recording_without_readings_proves_nothing() -> None:

@@ -43,6 +43,23 @@ def test_a_faulty_thermometer(damage: Callable[[Array], Array], said: str, write
     assert any(said in one for one in found(path)), found(path)
 
 
+def test_a_thermometer_without_a_reading_in_one_recording(write: Write) -> None:
+    """It is told as such, and the others are compared without it."""
+    rows, measured = recorded(WARM), BODY.replace("other input", "temperature") % ""
+    path = write(rows, measured)
+    files = {
+        "empty": [rows[0], *(row.rsplit(",", 1)[0] + "," for row in rows[1:])],
+        "cool": recorded(22.0 + 0.5 * (WARM - 22.0)),
+        "hot": recorded(22.0 + 1.5 * (WARM - 22.0)),
+    }
+    with path.open("a") as campaign:
+        for name, lines in files.items():
+            (path.parent / f"{name}.csv").write_text("\n".join(lines) + "\n")
+            campaign.write(f'{name} = {{ file = "{name}.csv" }}\n')
+    told = found(path)
+    assert any("empty.csv: 'body' has no readings" in one for one in told), told
+
+
 def test_a_sound_thermometer_and_a_set_point(write: Write) -> None:
     assert found(write(recorded(WARM), BODY % ', between = "linear"')) == []
     held = np.where(np.arange(200) < 20, 22.0, 60.0)  # what a controller was told stands still
