@@ -171,13 +171,15 @@ def unfinished(
 
     Args:
         whole: `fitting` of the repaired model with the effects that are not sure, too: what they explain is
-            no sign of anything else. None where there are none.
+            no sign of anything else, unless it is more than the names do. None where there are none.
     """
     rms = fitting.judged[1 if verdict.named else 0]
     if not (verdict.named or verdict.word == NO_MISMATCH) or not _misses(fitting, rms, power=2):
         return verdict
-    if verdict.named and (other := whole()) is not None and not _misses(other, other.judged[1], power=2):
-        return verdict
+    if verdict.named and (other := whole()) is not None:
+        before, left = fitting.judged[0], other.judged[1]
+        if not _misses(other, left, power=2) and 2 * rms**2 <= before**2 + left**2:
+            return verdict
     still = "still " if verdict.named else ""
     missed = f"free runs on the fitted recordings {still}miss by {_size(fitting, rms, unit)}"
     firm = all(n.is_firm for n in verdict.named)

@@ -957,6 +957,10 @@ def test_what_unsure_effects_explain_is_no_sign_of_anything_else() -> None:
     assert unfinished(fault, run, "K", lambda: close) is fault
     assert unfinished(fault, run, "K", lambda: far).named == ()
     assert unfinished(fault, run, "K", lambda: None).named == ()
+    # a small computer without its heat sink: a jump as a load began, and the rest explained far more
+    little = Improvement(1.14, 1.12, 0.675, 0.0, 0.0, {})
+    rest = Improvement(1.14, 0.66, 0.675, 0.0, 0.0, {})
+    assert unfinished(fault, little, "K", lambda: rest).named == ()
 
 
 def test_a_model_that_misses_its_own_recordings_does_not_lack_nothing() -> None:
