@@ -291,8 +291,10 @@ def written_with(fit: Fit, model: Model, campaign: Campaign) -> Fit:
     grids = {s.grid.recording: s.grid for s in fit.problem.systems}
     problem = make_problem(model, campaign, list(grids), fit.problem.outputs, grids)
     place = {u.key: i for i, u in enumerate(fit.problem.unknowns)}
+    # what a memory holds where a recording begins at rest is no unknown
+    still = [n for n, state in model.states.items() if state.memory]
     problem = problem.among(
-        [i for i, u in enumerate(problem.unknowns) if u.spread != "moved" or u.key in place]
+        [i for i, u in enumerate(problem.unknowns) if u.key in place or not (u.is_start and u.name in still)]
     )
     index = [place[u.key if u.key in place else replace(u, recording=None).key] for u in problem.unknowns]
     theta = fit.theta[index]

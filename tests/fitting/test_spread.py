@@ -216,6 +216,22 @@ def test_what_is_one_number_in_a_fit_may_be_written_for_each_recording() -> None
         assert a.x == pytest.approx(b.x)
 
 
+def test_a_memory_that_begins_at_rest_is_no_unknown_when_a_fit_is_written_another_way() -> None:
+    """Of two recordings one begins with a load: only there what the memory holds is fitted."""
+    begins, rests = (cold(np.random.default_rng(seed), f"r{seed}") for seed in (9, 10))
+    begins.values["load"][:20], rests.values["load"][:] = 25.0, 0.0
+    begins.values["T"][0], rests.values["T"][:] = 40.0, rests.values["room"]
+    seen = campaign(begins, rests)
+    terms = (Term("air", "T", parse("h*(room - T)")), Term("late", "T", parse("g*lag(load, 300)")))
+    states = {"T": State("T", "degC")}  # begins at its first reading
+    fit = fit_model(replace(model(), terms=terms, states=states), seen, ["r9", "r10"])
+    held = [u.recording for u in fit.problem.unknowns if u.name == "lag_1"]
+    assert held == ["r9"]
+    again = written_with(fit, fit.model, seen)
+    for a, b in zip(again.trajectories, fit.trajectories, strict=True):
+        assert a.x == pytest.approx(b.x)
+
+
 def test_masses_that_are_warm_together_share_a_first_reading() -> None:
     """The start is the mean of two normal masses given their sum with noise, in closed form."""
     states = {
