@@ -29,7 +29,7 @@ BELIEF = 0.5  # log of the factor within which the start values of a hand-built 
 ODDS = 0.02  # prior odds of an effect of the catalogue to act, over all places; of an event in each recording
 USUAL = 0.2  # median size of an effect: what it makes flow, as a share of the largest flow of the model
 FACTOR = 3.0  # 68 % of sizes lie within this factor of their median (log-normal: zero at zero)
-UNKNOWN_HEAT = tuple(FACTOR**k for k in range(4))  # "none of these": times the unrecorded heat of a body ...
+UNKNOWN_HEAT = tuple(FACTOR**k for k in (1, 2, 3))  # "none of these": times the unrecorded heat of a body ...
 UNKNOWN_SHARES = (0.0, *(share for share in SHARES if share > SHARE))  # ... and of its flows; pairs alike
 
 # --- what is said -----------------------------------------------------------------------------------------
