@@ -32,17 +32,17 @@ from discovery.threads import side_by_side
 Array = NDArray[np.float64]
 Residuals = tuple[Array, Array]  # (R, Y) of a free run and of the filter
 
-_NONE = 1e-12  # squares of a block without readings
+_NONE = 1e-12  # squares of a block without readings; an rms
 
 
 @dataclass(frozen=True)
 class LeftOut:
     """What effects change of recordings that are left out of the fit.
 
-    `free`: rms of free runs in reading noises. `gains` (B,): by how much the model with the effects predicts
-    each block of time better, in squares of what a reading says beyond those before it. `free_gains` (F,):
-    the same in squares of the free runs, in blocks as long as the residuals of these are correlated, and
-    `free_logs` (F,) the logarithms of their ratios.
+    `free`: rms of free runs in reading noises, on average over the recordings. `gains` (B,): by how much the
+    model with the effects predicts each block of time better, in squares of what a reading says beyond those
+    before it. `free_gains` (F,): the same in squares of the free runs, in blocks as long as the residuals of
+    these are correlated, and `free_logs` (F,) the logarithms of their ratios.
     """
 
     free: Improvement
@@ -178,7 +178,17 @@ def _compared(
         free_gains.append(old - new)
         free_logs.append(np.log(np.maximum(old, _NONE) / np.maximum(new, _NONE)))
     found = (np.concatenate(each) for each in (gains, free_gains, free_logs))
-    return LeftOut(improvement(runs, outputs), *found)
+    return LeftOut(_on_average(runs, outputs), *found)
+
+
+def _on_average(runs: Sequence[FreeRuns], outputs: Sequence[str]) -> Improvement:
+    """The improvement over recordings, decided by the mean of the logarithms of their rms: one whose
+    parameters the others leave open does not drown the rest.
+    """
+    whole = improvement(runs, outputs)
+    each = [improvement([run], outputs).judged for run in runs]
+    old, new = (float(np.exp(np.mean(np.log(np.maximum(rms, _NONE))))) for rms in zip(*each, strict=True))
+    return replace(whole, started=(old, new, whole.low, whole.high))
 
 
 def _sums(before: Array, after: Array | None, blocks: int) -> tuple[Array, Array]:

@@ -282,6 +282,29 @@ def test_an_hour_that_goes_wrong_does_not_outvote_all_others(monkeypatch: pytest
     assert found.sure
 
 
+def test_a_recording_that_others_leave_open_does_not_outvote_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A delay of 160 s: two recordings by a quarter better, and a third, whose loss the two others do not
+    determine, missed by 12.7 reading noises, not by 10.8.
+    """
+    rms = {"r1": (5.7, 4.3), "r2": (4.2, 3.0), "r3": (10.8, 12.7)}
+
+    def residuals(_: Context, answer: Scored, chosen: Sequence[Hypothesis], fold: Fold) -> Residuals:
+        acts = len(chosen) == len(answer.hypotheses)
+        z = np.random.default_rng(1).standard_normal((400, 1)) / (1.0 if acts else 0.5)
+        return {name: (np.full((400, 1), rms[name][acts]), z) for name in fold.recordings}
+
+    monkeypatch.setattr(crossvalidation, "_residuals", residuals)
+    context = replace(dry(), outputs=("E_Y",), recordings=("r1", "r2", "r3"))
+    (h,) = wetted().hypotheses
+    found = left_out(context, wetted(), [h])[h.key]
+    assert found is not None
+    before, after = ((a * b * c) ** (1 / 3) for a, b, c in zip(*rms.values(), strict=True))
+    assert found.free.judged == pytest.approx((before, after))
+    assert found.improves
+
+
 def test_chance_makes_blocks_better_by_as_much_as_signs_that_are_drawn() -> None:
     """Every choice of signs is as likely by chance: of 2^10, those with ranks as high are counted."""
     rng, free = np.random.default_rng(2), Improvement(1.0, 0.9, 0.5, 0.0, 0.0, {})
