@@ -43,7 +43,8 @@ class Named:
 def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis) -> Named:
     """An effect of the answer; its rivals stand in its place next to the same others.
 
-    The same effect there in every recording and in one of them is one claim, not two that compete.
+    The same effect there in every recording and in one of them is one claim, not two that compete. In another
+    recording it is a rival: of two, a gain that is too low in one or too high in the other looks the same.
     """
     others = answer.keys - {h.key}
     below: dict[object, Rival] = {}
@@ -56,7 +57,7 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
         label = (rival.effect.word, rival.where)
         if not isfinite(gap):
             continue
-        if label != (h.effect.word, h.where):
+        if label != (h.effect.word, h.where) or _elsewhere(h, rival):
             if label not in below or gap < below[label].below:
                 below[label] = Rival(rival, gap)
         elif gap <= thresholds.RIVAL and rival.law == h.law and None in (h.event, rival.event):
@@ -67,6 +68,11 @@ def one_named(found: Search, posterior: Posterior, answer: Scored, h: Hypothesis
     keys = frozenset(rival.key for rival in (*near, *same))
     abrupt = answer.coarse and is_abrupt(answer, h)
     return Named(h, min(own, thresholds.SUREST), min(together, thresholds.SUREST), rivals, keys, abrupt)
+
+
+def _elsewhere(h: Hypothesis, rival: Hypothesis) -> bool:
+    """Whether both are events, of different recordings."""
+    return None not in (h.event, rival.event) and h.event != rival.event
 
 
 def claims(one: Scored, h: Hypothesis) -> bool:
