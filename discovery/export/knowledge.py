@@ -28,6 +28,7 @@ from discovery.errors import UserError
 from discovery.evidence.form_error import edge_columns, law_columns, scales_of
 from discovery.evidence.process_noise import floors, reading_noise
 from discovery.evidence.whitening import Whitened
+from discovery.export.guessed import at_readings
 from discovery.fitting import Fit, Noise
 from discovery.fitting.begin import first_noise
 from discovery.fitting.noise import resolution, white_noise
@@ -122,7 +123,7 @@ def knowledge(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Kn
     names = tuple(name for name in model.free if not model.parameters[name].per_recording)
     if not outputs:
         return Knowledge(dict.fromkeys(model.outputs), (), None, {}, {}, np.zeros((0, 1)))
-    problem = problem_of(model, campaign, recordings, outputs)
+    problem = problem_of(at_readings(model, campaign, recordings), campaign, recordings, outputs)
     stated = {name: campaign.channels[name].noise for name in outputs}
     theta, runs, white = _settled(problem, stated)
     residuals = [problem.residual(run) for run in runs]

@@ -11,6 +11,7 @@ from discovery import __version__
 from discovery.errors import UserError
 from discovery.export.compiled import compile_model, model_inputs
 from discovery.export.document import FORMAT, VERSION
+from discovery.export.guessed import START_SD
 from discovery.export.knowledge import knowledge
 from discovery.export.ranges import OutputRange, input_range, output_ranges
 from discovery.export.stepper import INTEGRATOR
@@ -18,8 +19,6 @@ from discovery.models import Model, Parameter, State, expanded
 from discovery.models.model import with_settled_memories
 from discovery.recordings import Campaign
 from discovery.terms import Expression, Name, Number, Term, names, substitute, text
-
-START_SD = 2.0  # um or K: of a start value that was a reading and is a guess now
 
 
 def exportable(model: Model, campaign: Campaign) -> Model:

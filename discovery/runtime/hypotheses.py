@@ -22,6 +22,7 @@ from discovery.diagnosis.thresholds import UNKNOWN_HEAT, UNKNOWN_SHARES
 from discovery.errors import UserError
 from discovery.evidence.bayes import Score
 from discovery.export.document import Exported
+from discovery.export.guessed import at_readings
 from discovery.export.knowledge import problem_of, read_knowledge, settle_starts
 from discovery.export.trend import DAY_S
 from discovery.fitting.covariance import Z95
@@ -90,7 +91,8 @@ class Comparison:
     unseen: Mapping[str, str] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        others = ", ".join(f"{name} {value:+.1f}" for name, value in self.odds.items() if name != "nothing")
+        odds = {name: round(value, 1) + 0.0 for name, value in self.odds.items() if name != "nothing"}
+        others = ", ".join(f"{name} {value:+.1f}" for name, value in odds.items())  # never "-0.0"
         what = f" ({self.what})" if self.what else ""
         return (
             f"{', '.join(self.recordings)}: {self.verdict}{what}; {counted(self.readings, 'reading')}, "
@@ -106,6 +108,7 @@ def compare(
     *,
     choose: bool = False,
     named: bool = True,
+    begin: Mapping[str, float] | None = None,
     since: float | None = None,
 ) -> Comparison:
     """Compare the hypotheses on recordings taken since the last revision.
@@ -113,6 +116,7 @@ def compare(
     Args:
         choose: a recorded input that the model does not use may act by a path of its own, too.
         named: effects of the catalogue may have begun; to try them all takes a minute.
+        begin: states of the model where the recordings begin; default as they are read there.
         since: instant [s] where the recording begins, for a model that moves by date.
 
     Raises:
@@ -126,6 +130,7 @@ def compare(
             f"{campaign.path}: recording '{recordings[0]}' holds no reading of {', '.join(levels)}; "
             "there is nothing to learn from"
         )
+    exported = begun(exported, campaign, recordings, begin)
     problem = problem_of(_moving(exported, since), campaign, recordings, outputs)
     channels = [i.name for i in exported.inputs if i.role in TEMPERATURES]
     ways = {str(p): p for p in paths(exported, campaign, recordings, outputs)} if choose else {}
@@ -195,9 +200,16 @@ def compare(
 
 
 def residual_lately(
-    exported: Exported, campaign: Campaign, recordings: Sequence[str], since: float | None = None
+    exported: Exported,
+    campaign: Campaign,
+    recordings: Sequence[str],
+    begin: Mapping[str, float] | None = None,
+    since: float | None = None,
 ) -> float:
-    """Residual of a model on recordings, as of now, in units of that of its fit; `since`: see `compare`."""
+    """Residual of a model on recordings, as of now, in units of that of its fit; `begin` and `since`: see
+    `compare`.
+    """
+    exported = begun(exported, campaign, recordings, begin)
     residual = exported.document["knowledge"]["residual"]
     levels = {n: r for n, r in residual.items() if r is not None}
     outputs = [n for n in levels if any(_read(campaign, r, n) for r in recordings)]
@@ -311,11 +323,15 @@ def _rms(problem: Problem, levels: Mapping[str, float], outputs: Sequence[str], 
     return float(np.sqrt(total / weight))
 
 
-def begun(exported: Exported, states: Mapping[str, float]) -> Exported:
+def begun(
+    exported: Exported, campaign: Campaign, recordings: Sequence[str], states: Mapping[str, float] | None
+) -> Exported:
     """The model as it starts from states that are known: those it had where the recording begins. Others keep
-    their start.
+    their start. None: nothing is known but what is read there.
     """
     model = exported.model
+    if states is None:
+        return replace(exported, model=at_readings(model, campaign, recordings))
     started = {
         name: replace(state, start=parse(repr(float(states[name]))), start_sd=START_SD)
         if name in states

@@ -26,7 +26,7 @@ from discovery.files import write_atomic
 from discovery.recordings import Campaign
 from discovery.runtime.compensator import Compensator, State
 from discovery.runtime.guards import Reading, number
-from discovery.runtime.hypotheses import Comparison, begun, compare
+from discovery.runtime.hypotheses import Comparison, compare
 from discovery.runtime.measured import new_errors
 from discovery.runtime.recorder import Recorder
 from discovery.runtime.shadow import predictions
@@ -69,7 +69,7 @@ def answer(question: Question) -> Answer:
         UserError: a model without knowledge of its parameters.
     """
     exported, campaign, begin, since = question.exported, question.campaign, question.begin, question.since
-    found = compare(begun(exported, begin), campaign, ["running"], choose=True, named=False, since=since)
+    found = compare(exported, campaign, ["running"], choose=True, named=False, begin=begin, since=since)
     revised = revision_of(exported, campaign, found, begin=begin, since=since)
     return found, None if revised is None else revised[0]
 

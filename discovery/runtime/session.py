@@ -12,6 +12,7 @@ from discovery.errors import UserError
 from discovery.export.document import Exported, render
 from discovery.export.settling import beginning
 from discovery.printed import counted
+from discovery.runtime.advice import measure_more
 from discovery.runtime.clock import Clock
 from discovery.runtime.compensator import Compensator, Settings, State, Tick
 from discovery.runtime.events import Event, instant
@@ -292,7 +293,7 @@ class Session:
             "input sensor": f"check the sensor of {found.what}",
             "new physics": "record the machine and run `discovery update`, which can say more",
             "something else": "record the machine and run `discovery update`, which can name the change",
-            "undecided": "measure more often, wet and dry",
+            "undecided": measure_more([one.name for one in self.compensator.exported.inputs]),
         }.get(found.verdict, "")
         self.tell(now, f"learning: {found.verdict}", str(found), remedy)
         if revised is not None:

@@ -13,9 +13,11 @@ from discovery.export.knowledge import read_knowledge
 from discovery.export.seal import open_seal
 from discovery.export.trend import DAY_S
 from discovery.recordings import Campaign
-from discovery.runtime.hypotheses import Comparison, begun, compare, model_with, residual_lately
+from discovery.runtime.advice import to_distinguish
+from discovery.runtime.hypotheses import Comparison, compare, model_with, residual_lately
 from discovery.runtime.newphysics import sizes_of
 from discovery.runtime.unused import with_input, without_input
+from discovery.runtime.verdict import LEAST_ODDS
 from discovery.runtime.wear import trend_of
 
 if TYPE_CHECKING:
@@ -28,12 +30,13 @@ MAY = 0.95  # residual after a change, as a share of that before: a revision tha
 @dataclass(frozen=True)
 class Update:
     """What an update found and wrote; `path` None: nothing to change. `after`: residual of the next revision
-    in units of that of the fit.
+    in units of that of the fit. `advice`: what to record, where the recordings distinguish too little.
     """
 
     comparison: Comparison
     path: Path | None = None
     after: float | None = None
+    advice: str = "measure more often"
 
     def lines(self) -> list[str]:
         """What a user wants to know of it."""
@@ -48,7 +51,7 @@ class Update:
                 "runs it in the shadow of the active one first"
             )
             return lines
-        lines.append(f"the model is kept: {_why(found)}")
+        lines.append(f"the model is kept: {_why(found, self.advice)}")
         if found.unseen:
             hidden = "; ".join(f"{name} up to {size}" for name, size in found.unseen.items())
             lines.append(f"smaller changes may be hidden, in the numbers of the model: {hidden}")
@@ -62,14 +65,14 @@ def _size(found: Comparison) -> str:
     return f"all of it changed by about {100 * found.share:+.0f} %, as with a fan or a door"
 
 
-def _why(found: Comparison) -> str:
+def _why(found: Comparison, advice: str) -> str:
     match found.verdict:
         case "nothing":
-            return "these recordings show no change of the machine"
+            return "these recordings show no change of the machine" + _perhaps(found)
         case "input sensor":
             return f"the sensor of {found.what} has an offset; check it. No parameter is changed to hide it"
         case "undecided":
-            return f"{found.what}: these recordings do not distinguish them; measure more often, wet and dry"
+            return f"{found.what}: these recordings do not distinguish them; {advice}"
         case "something else":
             return (
                 "something changed that wear cannot change and no effect of the catalogue explains; look at "
@@ -81,6 +84,18 @@ def _why(found: Comparison) -> str:
             return f"add {found.what} to it, record the machine as it is now, and fit the model again"
         case _:
             return "the revision would not lower the residual"
+
+
+def _perhaps(found: Comparison) -> str:
+    """What may have begun, where it is more likely than no change and yet not sure."""
+    likely = max(found.odds, key=lambda name: found.odds[name], default="nothing")
+    if found.odds.get(likely, 0.0) < LEAST_ODDS:
+        return ""
+    return (
+        f" that is sure; {likely} may have begun ({found.odds[likely]:+.1f}). The model leaves "
+        f"{found.rms:.1f} times the residual of its fit, which its unsure parameters and laws may explain, "
+        "too; check that, and record more"
+    )
 
 
 def update_file(
@@ -95,7 +110,7 @@ def update_file(
     found = compare(exported, campaign, recordings)
     revised = revision_of(exported, campaign, found)
     if revised is None:
-        return Update(found)
+        return Update(found, advice=to_distinguish(exported, campaign, recordings))
     document, after = revised
     write_document(out, document, key)
     return Update(found, out, after)
@@ -119,8 +134,7 @@ def revision_of(
         return None
     document = next_revision(exported, campaign, found, since)
     again = from_document(*open_seal(render(document), exported.model.name), exported.model.name)
-    started = begun(again, begin) if begin is not None else again
-    after = residual_lately(started, campaign, found.recordings, since)
+    after = residual_lately(again, campaign, found.recordings, begin, since)
     return (document, after) if after < MAY * found.lately else None
 
 

@@ -70,7 +70,8 @@ def before(one: Explanation, asked: Collection[Explanation]) -> float:
 def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
     """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
     evidence of a name in a diagnosis. So does an effect of the catalogue, or another exchange with a
-    temperature, over all that explains the readings without it.
+    temperature, over all that explains the readings without it. Where one of these is more likely than the
+    sensor, none has the name.
 
     Args:
         odds: of each hypothesis against `nothing`, logarithms with those before any reading.
@@ -83,8 +84,7 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
     if effect and odds[effect] - max(odds[best], 0.0) >= SURE:
         if probability(odds, effect) >= NAMED:
             return "new physics", str(effect)
-        others = _without(odds, effect)
-        return "undecided", f"{effect} or {max(others, key=lambda one: others[one])}"
+        return "undecided", _or_next(odds, effect)
     if odds[best] < LEAST_ODDS:
         return "nothing", ""
     if odds[best] - odds[second] < RIVAL:
@@ -92,8 +92,10 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
         return "undecided", f"{first[0]} or {first[1]}"
     if best.kind == "wear" or best.kind == "something else":
         return best.kind, ""
+    if effect and odds[effect] > odds[best]:
+        return "undecided", _or_next(odds, effect)
     if evidence[best] < SURE:
-        return "undecided", f"{best} or {SOMETHING_ELSE}"
+        return "undecided", _or_next(odds, best)
     if best.kind == "no input":
         return "idle input", best.what
     return "unused input" if best.kind == "input" else "input sensor", best.what
@@ -109,7 +111,7 @@ def explains_all(verdict: Verdict, what: str, also: float) -> tuple[Verdict, str
     if verdict == "wear" and also >= LEAST_ODDS:
         return "something else", "wear does not explain all of it"
     if verdict == "input sensor" and also > -RIVAL:
-        return "undecided", f"sensor of {what} or something else"
+        return "undecided", f"sensor of {what} alone or with something else"
     return verdict, what
 
 
@@ -119,6 +121,13 @@ def probability(odds: Odds, effect: Explanation) -> float:
     """
     ahead = odds[effect] - max(_without(odds, effect).values())
     return min(SUREST, float(1.0 / (1.0 + np.exp(-np.clip(ahead, -500.0, 500.0)))))
+
+
+def _or_next(odds: Odds, one: Explanation) -> str:
+    """A hypothesis or the most likely of the others, the same at another place left out."""
+    others = _without(odds, one)
+    other = max(others, key=lambda e: others[e])
+    return f"{one} or {'no change' if other == NOTHING else other}"
 
 
 def _without(odds: Odds, effect: Explanation) -> dict[Explanation, float]:

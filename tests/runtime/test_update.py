@@ -15,6 +15,7 @@ from discovery.errors import UserError
 from discovery.export.document import Exported, read_document, write_document
 from discovery.export.knowledge import read_knowledge
 from discovery.recordings import Campaign, Recording
+from discovery.runtime.advice import measure_more
 from discovery.runtime.changes import Change, Table, Wear
 from discovery.runtime.hypotheses import Comparison, compare
 from discovery.runtime.newphysics import Point, Task
@@ -296,11 +297,18 @@ def test_what_readings_do_not_distinguish_is_not_signed() -> None:
     assert verdict_of({**odds, SOMETHING_ELSE: 20.0}, evidence) == ("something else", "")
     weak = verdict_of({**odds, WEAR: -1.0, sensor: 6.0}, {**evidence, sensor: 9.0})
     assert weak == ("undecided", "sensor of T or something else")
+    rare = {SOMETHING_ELSE: -4.0, WEAR: -1.0, sensor: 6.0}  # what is named is what is likely
+    assert verdict_of({**odds, **rare}, {**evidence, sensor: 9.0}) == (
+        "undecided",
+        "sensor of T or no change",
+    )
+    drift = Explanation("effect", "drift at S", "drift")
+    assert verdict_of({**odds, WEAR: 0.0, drift: 12.0}, evidence)[1] == "drift at S or sensor of T"
     acts, idle = Explanation("input", "fan"), Explanation("no input", "fan")
     for one, verdict in ((acts, "unused input"), (idle, "idle input")):
         assert verdict_of({**odds, one: 30.0}, {**evidence, one: 32.0}) == (verdict, "fan")
     said = Comparison(("a",), 9, "undecided", "wear or sensor of T", {}, 1.4, 1.4, {}, np.zeros((0, 1)))
-    assert "measure more often, wet and dry" in Update(said).lines()[-1]
+    assert Update(said, advice=measure_more(["P"])).lines()[-1].endswith(measure_more(["P"]))
     quiet = replace(said, verdict="nothing", what="", unseen={"sensor of T": "0.5 K"})
     assert Update(quiet).lines()[-1].endswith("sensor of T up to 0.5 K")
 
@@ -330,7 +338,10 @@ def test_an_effect_is_named_only_where_it_is_sure() -> None:
 def test_a_sensor_explains_all_or_is_not_named() -> None:
     """Heat that an offset of a sensor explains in part leaves something else to explain."""
     assert explains_all("input sensor", "T_env", -4.0) == ("input sensor", "T_env")
-    assert explains_all("input sensor", "T_env", -0.3) == ("undecided", "sensor of T_env or something else")
+    assert explains_all("input sensor", "T_env", -0.3) == (
+        "undecided",
+        "sensor of T_env alone or with something else",
+    )
     assert explains_all("wear", "", 2.0) == ("wear", "")
     assert explains_all("wear", "", 3.0)[0] == "something else"
 
