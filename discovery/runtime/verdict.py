@@ -70,8 +70,8 @@ def before(one: Explanation, asked: Collection[Explanation]) -> float:
 def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
     """The best hypothesis, if it beats `nothing` and its rivals clearly. A sensor or an input needs the
     evidence of a name in a diagnosis. So does an effect of the catalogue, or another exchange with a
-    temperature, over all that explains the readings without it. Where one of these is more likely than the
-    sensor, none has the name.
+    temperature, over all that explains the readings without it. Where another exchange is more likely than
+    the sensor, neither has the name.
 
     Args:
         odds: of each hypothesis against `nothing`, logarithms with those before any reading.
@@ -92,8 +92,9 @@ def verdict_of(odds: Odds, evidence: Odds) -> tuple[Verdict, str]:
         return "undecided", f"{first[0]} or {first[1]}"
     if best.kind == "wear" or best.kind == "something else":
         return best.kind, ""
-    if effect and odds[effect] > odds[best]:
-        return "undecided", _or_next(odds, effect)
+    # effects have their sizes fitted and need more; another exchange is an integral as that of the sensor
+    if any(odds[one] > odds[best] for one in evidence if one.is_new_physics):
+        return "undecided", _or_next(odds, max(odds, key=lambda one: odds[one]))
     if evidence[best] < SURE:
         return "undecided", _or_next(odds, best)
     if best.kind == "no input":

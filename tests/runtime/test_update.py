@@ -302,8 +302,12 @@ def test_what_readings_do_not_distinguish_is_not_signed() -> None:
         "undecided",
         "sensor of T or no change",
     )
-    drift = Explanation("effect", "drift at S", "drift")
-    assert verdict_of({**odds, WEAR: 0.0, drift: 12.0}, evidence)[1] == "drift at S or sensor of T"
+    fan, drift = Explanation("exchange with", "T"), Explanation("effect", "drift at S", "drift")
+    likely = {**odds, WEAR: 0.0, fan: 12.0}
+    assert verdict_of(likely, {**evidence, fan: 16.0}) == ("undecided", "exchange with T or sensor of T")
+    assert verdict_of({**likely, fan: 9.0}, {**evidence, fan: 13.0}) == ("input sensor", "T")
+    most = verdict_of({**likely, drift: 12.5}, {**evidence, fan: 16.0})
+    assert most == ("undecided", "drift at S or exchange with T")
     acts, idle = Explanation("input", "fan"), Explanation("no input", "fan")
     for one, verdict in ((acts, "unused input"), (idle, "idle input")):
         assert verdict_of({**odds, one: 30.0}, {**evidence, one: 32.0}) == (verdict, "fan")
