@@ -54,6 +54,7 @@ _SCALED = ("unit", "factor", "sign", "halfway", "swap")  # repairs that change v
 _MOST_OF = (0.05, 0.5, 0.95)  # of the values of an input: what lies there says where it is
 _CLEARLY = 0.1  # of the range of an input: by so much nearer to other recordings is no chance
 _BEGINS = 5.0  # K: by so much more a temperature begins elsewhere than in any other recording
+_FREE = ("drift", "offset")  # repairs whose size is fitted
 _FREE_AGREES = 0.3  # of the movement: a drift or an offset of any size fits a little of a poor prediction
 # how much larger the gain of a less usual damage must be to go before a usual one
 _DOUBT = {
@@ -122,7 +123,7 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         b, a, limit = (
             float(np.sqrt(np.mean([of[y] ** 2 for y in touched]))) for of in (misfit, after, usual)
         )
-        most = _FREE_AGREES if repair.kind in ("drift", "offset") else 0.6
+        most = _FREE_AGREES if repair.kind in _FREE else 0.6
         agrees = a < _TWO_AGREES if two else a < min(_AGREES * limit, most)
         # the log likelihood of each output's readings; half of them by chance is as good as all by a little
         each = [np.log(max(misfit[y], LEAST) / max(after[y], LEAST)) for y in touched]
@@ -133,9 +134,23 @@ def _repairs(known: CrossPrediction, one: Seen) -> list[tuple[float, Disagreemen
         whole = b > _FAR * limit and a < _BACK * limit and gain > _WHOLE and not two
         # an offset of free size and place fits a little of anything: it has to explain the whole
         helps = agrees and (whole or (gain > least and repair.kind != "offset"))
+        if helps and two and repair.kind in _FREE and not agree_both_ways(known, repair, touched):
+            continue  # of two, the other one may hold what this one does not
         if helps and not any(_begins_apart(known, repair, y) for y in touched):
             found.append((gain - 2 * _DOUBT[repair.kind], Disagreement(one.name, repair, b, a, limit, gain)))
     return found
+
+
+def agree_both_ways(known: CrossPrediction, repair: Repair, outputs: Sequence[str]) -> bool:
+    """Whether a repaired recording predicts each other one, too."""
+    again = known.having(repair.made)
+    for name in again.recordings.keys() - {repair.made.name}:
+        predicted = again.predicted(name, outputs)
+        for y in predicted.theta:
+            reading = again.readings[name, y]
+            if reading is not None and again.misfit(predicted, y, reading) > _FREE_AGREES:
+                return False
+    return True
 
 
 def _begins_elsewhere(known: CrossPrediction, one: Seen, repair: Repair) -> bool:
@@ -231,14 +246,27 @@ def _candidates(
         for y, reading in read.items():
             left = known.residual(predicted, y, reading)
             rate = float(np.polyfit(reading.at, left, 1)[0])
-            yield drifting(one, y, rate, known.channels[y].unit)
+            rivals = _rivals(known, predicted, reading, left, left - rate * reading.at)
+            yield drifting(one, y, rate, known.channels[y].unit, rivals)
     for y, reading in read.items():
         left = known.residual(predicted, y, reading)
         since, size = _offset(reading.at, left)
         near = _STEP * float(one.time[-1])
         # a poor prediction may jump where the readings do not, or creep away from them
         if all(_at_once(reading.at, values, since, size, near) for values in (left, reading.read)):
-            yield offset(one, y, since, size, known.channels[y].unit)
+            rivals = _rivals(known, predicted, reading, left, left - size * (reading.at > since))
+            yield offset(one, y, since, size, known.channels[y].unit, rivals)
+
+
+def _rivals(
+    known: CrossPrediction, predicted: Prediction, reading: Reading, left: Array, after: Array
+) -> list[str]:
+    """Inputs of another size than recorded that leave as little of a residual (R,) as a drift or an offset of
+    the output does: `after` (R,). Where a load hardly moves, a body follows it like a drift.
+    """
+    least = float(np.std(after)) * np.exp(_DOUBT["factor"])
+    every = known.left_by_inputs(predicted, reading, left)
+    return [name for name, rest in every.items() if rest < least]
 
 
 def _at_once(at: Array, values: Array, since: float, size: float, near: float) -> bool:

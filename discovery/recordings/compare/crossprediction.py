@@ -149,6 +149,24 @@ class CrossPrediction:
         left = self.residual(predicted, y, reading)
         return _std(left) / max(reading.movement, 0.25 * self.size[y], 1e-12)
 
+    def left_by_inputs(self, predicted: Prediction, reading: Reading, left: Array) -> dict[str, float]:
+        """Standard deviation of a residual (R,) once each input that is no temperature takes what it can: as
+        if it were larger or smaller by a share, through one response of any time constant. A body that is
+        slower than the recording is long integrates.
+        """
+        grid, found = predicted.responses.grid, {}
+        for name in self.inputs:
+            if self.channels[name].unit == "degC":
+                continue
+            added = np.cumsum(predicted.responses.even[name])[:, None]
+            columns = _at(grid, np.hstack([predicted.responses.of_input[name], added]), reading.at)
+            columns = columns - columns.mean(axis=0)
+            size = np.sqrt((columns**2).sum(axis=0))
+            moves = columns[:, size > 0] / size[size > 0]
+            shown = np.max((moves.T @ left) ** 2, initial=0.0)
+            found[name] = float(np.sqrt(max(_std(left) ** 2 - shown / left.size, 0.0)))
+        return found
+
     def usual_misfit(self, without: str, y: str) -> float:
         """Median misfit of other recordings, each predicted without itself and the one in question."""
         others = [name for name, of in self.grams if of == y and name != without]

@@ -170,21 +170,37 @@ def paced(one: Seen, factor: float) -> Repair:
     )
 
 
-def drifting(one: Seen, name: str, per_second: float, unit: str) -> Repair:
-    """An output that creeps away by so much a second."""
+def drifting(one: Seen, name: str, per_second: float, unit: str, rivals: Sequence[str] = ()) -> Repair:
+    """An output that creeps away by so much a second; `rivals`: inputs that explain it as well."""
     whole = per_second * float(one.time[-1])
     made = one.values[name] - per_second * one.time
-    what = f"'{name}' drifts by {whole:.3g} {unit} over the recording; no recorded input explains it"
-    return Repair("drift", (name,), what, "check its zero and its holder", one.having({name: made}))
+    what = f"'{name}' drifts by {whole:.3g} {unit} over the recording{_or(rivals)}"
+    do = f"check its zero and its holder{_scale_of(rivals)}"
+    return Repair("drift", (name,), what, do, one.having({name: made}))
 
 
-def offset(one: Seen, name: str, since: float, size: float, unit: str) -> Repair:
-    """An output that is higher (lower where below zero) by so much from an instant [s] on."""
+def _or(rivals: Sequence[str]) -> str:
+    """What else an output may follow that others do not predict."""
+    if not rivals:
+        return "; no recorded input explains it"
+    inputs = " or ".join(f"'{name}'" for name in rivals)
+    return f", or {inputs} is larger or smaller than recorded, in this recording or in the others"
+
+
+def _scale_of(rivals: Sequence[str]) -> str:
+    inputs = " and ".join(f"'{name}'" for name in rivals)
+    return f", and the scale of {inputs}" if rivals else ""
+
+
+def offset(one: Seen, name: str, since: float, size: float, unit: str, rivals: Sequence[str] = ()) -> Repair:
+    """An output that is higher (lower where below zero) by so much from an instant [s] on; `rivals`: inputs
+    that explain it as well.
+    """
     made = one.values[name] - size * (one.time > since)
     side = "higher" if size > 0 else "lower"
     at = _duration(since)
-    what = f"'{name}' is {abs(size):.3g} {unit} {side} from {at} on; no recorded input explains it"
-    do = "check the sensor and its holder; split the recording there"
+    what = f"'{name}' is {abs(size):.3g} {unit} {side} from {at} on{_or(rivals)}"
+    do = f"check the sensor and its holder{_scale_of(rivals)}; split the recording there"
     return Repair("offset", (name,), what, do, one.having({name: made}))
 
 
