@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 
@@ -34,6 +34,17 @@ def lasting(seconds: float) -> str:
         if seconds >= size:
             return f"{printed(seconds / size, 2)} {unit}"
     return f"{printed(seconds, 2)} s"
+
+
+def spanned(times: Sequence[float], digits: int = 3) -> str:
+    """Instants [s] from the first on as one says them, in the unit of the last.
+
+    >>> spanned([0.2, 20.0]), spanned([63360.0, 83880.0]), spanned([90.0])
+    ('0.2 to 20 s', '17.6 to 23.3 h', '1.5 min')
+    """
+    last = max(times, default=0.0)
+    unit, size = next((u, s) for u, s in (("h", 3600.0), ("min", 60.0), ("s", 0.0)) if last >= s)
+    return f"{' to '.join(printed(t / (size or 1.0), digits) for t in times)} {unit}"
 
 
 def sized(value: float, unit: str, digits: int = 3) -> str:

@@ -15,6 +15,8 @@ def test_a_difference_of_temperatures_is_in_kelvin() -> None:
         "units": {"T_head": "degC"},
         "models": {"lumped": entry},
     }
+    read = rms_table({"": results | {"roles": {"T_head": "temperature"}}}, "sun")
+    assert read.rows[0][0] == "without a model"  # nobody compensates a temperature
     table = rms_table({"": results}, "sun")
     assert table.header == ("rms", "", "T_head [K]")
     assert table.rows == (("uncompensated", "", 8.0), ("lumped", "3 terms", 0.4))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from discovery.effects.hypothesis import Hypothesis
-from discovery.printed import printed
+from discovery.printed import spanned
 from discovery.recordings import Campaign
 
 
@@ -23,15 +23,5 @@ def in_words(campaign: Campaign, h: Hypothesis) -> str:
     """Place, recording and hours of an event: "at head in wed from 17.6 to 23.3 h"."""
     at = f"at {', '.join(h.places)} " if h.places else ""
     times = instants(campaign, h)
-    unit, size = next(
-        (u, s) for u, s in (("h", 3600.0), ("min", 60.0), ("s", 0.0)) if max(times, default=0) >= s
-    )
-    hours = [printed(t / (size or 1.0)) for t in times]
-    when = (
-        f" from {hours[0]} to {hours[1]} {unit}"
-        if len(hours) == 2
-        else f" at {hours[0]} {unit}"
-        if hours
-        else ""
-    )
+    when = f" {'from' if len(times) == 2 else 'at'} {spanned(times)}" if times else ""
     return f"{at}in {h.recording}{when}"

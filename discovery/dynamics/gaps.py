@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discovery.dynamics.samples import Samples
+from discovery.printed import spanned
 
 Array = NDArray[np.float64]
 
@@ -93,7 +94,7 @@ def sentences(silent: Mapping[str, Mapping[str, Samples]]) -> list[str]:
             continue
         begin, end = max(gaps, key=lambda gap: gap[1] - gap[0])
         more = f", nor in {len(gaps) - 1} more gap{'s' * (len(gaps) > 2)}" if len(gaps) > 1 else ""
-        when = f"from {begin / 3600:.3g} to {end / 3600:.3g} h"
+        when = f"from {spanned((begin, end))}"
         did = f"what {', '.join(channels)} did in {recording} {when}"
         said.append(f"{did} is not recorded{more}; the fit allows for it")
     return said

@@ -44,6 +44,17 @@ def table_1(results: Mapping[str, Any], model: str, recordings: Mapping[str, str
     return Table(f"Reduction of the arithmetic mean by '{model}' [%] (Table 1)", tuple(header), tuple(rows))
 
 
+def without_model(results: Mapping[str, Any], outputs: Sequence[str]) -> str:
+    """What outputs are called that no model predicts: nobody compensates a temperature.
+
+    >>> without_model({"roles": {"T": "temperature", "E": "error"}}, ["T"]), without_model({}, ["E"])
+    ('without a model', 'uncompensated')
+    """
+    roles = results.get("roles") or {}
+    errors = all(roles.get(name, "error") == "error" for name in outputs)
+    return "uncompensated" if errors else "without a model"
+
+
 def table_3(
     results: Mapping[str, Any],
     recording: str,
@@ -64,7 +75,8 @@ def table_3(
     rows: list[tuple[str | float | None, ...]] = []
     for error in dict.fromkeys(error for entries in found.values() for error in entries):
         having = [name for name in chosen if error in found[name]]
-        rows.append(_row(error, "uncompensated", found[having[0]][error]["uncompensated"], "uncompensated"))
+        raw = found[having[0]][error]["uncompensated"]
+        rows.append(_row(error, without_model(results, [error]), raw, "uncompensated"))
         equations = {name: EQUATION.get(str(results["models"][name].get("kind"))) for name in having}
         rows += [_row(error, name, found[name][error], equations[name]) for name in having]
         for name in having:

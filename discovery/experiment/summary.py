@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from discovery.evaluation.rolematrix import matrix
-from discovery.evaluation.tables import Table, as_text
+from discovery.evaluation.tables import Table, as_text, without_model
 from discovery.models.units import differences
 from discovery.report.compare import groups, labels_of, merged, shared_recordings
 from discovery.report.printed import Printed
@@ -96,7 +96,7 @@ def _plain(table: Printed) -> Table:
 
 
 def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
-    """rms of each output, a row for each model that predicted the recording; uncompensated errors first."""
+    """rms of each output, a row for each model that predicted the recording; first without one."""
     rows: list[tuple[str | float | None, ...]] = []
     models = [model for one in runs.values() for model in one["models"].values()]
     outputs = list(dict.fromkeys(y for m in models for scores in m["recordings"].values() for y in scores))
@@ -108,7 +108,7 @@ def rms_table(runs: Mapping[str, Mapping[str, Any]], recording: str) -> Table:
             continue
         raw = {y: e["uncompensated"]["rms"] for entry in entries.values() for y, e in entry.items()}
         label = f"{run}: " if run else ""
-        rows.append((f"{label}uncompensated", "", *(raw.get(y) for y in outputs)))
+        rows.append((f"{label}{without_model(results, outputs)}", "", *(raw.get(y) for y in outputs)))
         for name, entry in entries.items():
             terms = results["models"][name]["terms"]
             size = f"{terms} terms" if terms else ""

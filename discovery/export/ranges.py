@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from discovery.errors import UserError
 from discovery.export.compiled import Compiled
 from discovery.export.stepper import free_run
+from discovery.printed import lasting
 from discovery.recordings import Campaign, sample_input
 from discovery.recordings.roles import ROLES
 
@@ -142,7 +143,7 @@ def output_ranges(
         y = free_run(compiled, inputs)
         if len(y) < len(inputs):
             raise UserError(
-                f"model '{compiled.name}' diverges after {len(y) * compiled.step_s / 3600:.1f} h of "
+                f"model '{compiled.name}' diverges after {lasting(len(y) * compiled.step_s)} of "
                 f"recording '{recording}' with a fixed step of {compiled.step_s:g} s; check the model or "
                 "export with a shorter --step"
             )

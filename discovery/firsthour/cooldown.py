@@ -15,6 +15,7 @@ from discovery.firsthour.guess import Guess
 from discovery.firsthour.measures import DEGREES
 from discovery.firsthour.recorded import Recorded
 from discovery.firsthour.table import Array, OwnTable
+from discovery.printed import lasting
 
 _HEATS = ("speed", "power")  # quantities without which a machine cools down
 _FALL = 0.3  # of the rise: a warm spindle that runs falls by less
@@ -29,9 +30,9 @@ def cooldowns(found: Recorded, guesses: Mapping[str, Guess]) -> Iterator[str]:
         for name, value in values.items():
             cooled = _cooldown(found.recordings[name], guesses)
             if quantity in _HEATS and value and cooled:
-                header, start_h, share = cooled
+                header, start, share = cooled
                 yield (
-                    f"warning: {name}: {header} cools down from {start_h:.3g} h on (by {share:.0%} of its "
+                    f"warning: {name}: {header} cools down from {lasting(start)} on (by {share:.0%} of its "
                     f"rise), but {quantity} = {value:g} {unit} of the file's name is held until the end; if "
                     f"the machine stood still then, cut the file there, or give every file a column of "
                     f"{quantity}"
@@ -39,7 +40,7 @@ def cooldowns(found: Recorded, guesses: Mapping[str, Guess]) -> Iterator[str]:
 
 
 def _cooldown(run: OwnTable, guesses: Mapping[str, Guess]) -> tuple[str, float, float] | None:
-    """The temperature that rises most above the room and falls back: its header, when it begins to fall [h
+    """The temperature that rises most above the room and falls back: its header, when it begins to fall [s
     from the start], and by how much of its rise; None where it does not.
     """
     room = [c.values for c in run.columns if guesses[c.name].role == "ambient temperature"]
@@ -55,7 +56,7 @@ def _cooldown(run: OwnTable, guesses: Mapping[str, Guess]) -> tuple[str, float, 
         rise, fall = float(excess[peak] - excess[0]), float(excess[peak] - excess[-1])
         if found is None or rise > found[0]:
             begin = np.flatnonzero(excess >= excess[peak] - _NEAR * rise)[-1]
-            found = rise, column.header, float(run.time[begin] - run.time[0]) / 3600.0, fall
+            found = rise, column.header, float(run.time[begin] - run.time[0]), fall
     if found is None or found[0] < _LEAST_K or found[3] < _FALL * found[0]:
         return None
     return found[1], found[2], found[3] / found[0]

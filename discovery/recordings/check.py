@@ -27,6 +27,7 @@ from discovery.recordings.valuecheck import (
     frozen_findings,
     load_findings,
     range_findings,
+    said_once,
     small_findings,
 )
 from discovery.schema import sentences, suggest
@@ -55,6 +56,7 @@ def check_campaign(path: str | os.PathLike[str], only: Collection[str] | None = 
     findings.extend(_in_campaign(path, text, key, what) for key, what in wrong)
     seen: dict[str, str] = {}
     whole: list[Seen] = []
+    checked = sum(only is None or name in only for name in form.recordings)
     for name, recording in form.recordings.items():
         if only is not None and name not in only:
             continue
@@ -75,7 +77,7 @@ def check_campaign(path: str | os.PathLike[str], only: Collection[str] | None = 
             )
     channels = {name: make_channel(name, form.channels[name], to) for name, to in conversions.items()}
     findings.extend(compare(path, whole, channels))
-    return findings
+    return said_once(findings, path, checked)
 
 
 def summary(findings: Sequence[Finding], misfits: Sequence[str] = ()) -> str:

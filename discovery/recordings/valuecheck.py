@@ -1,6 +1,6 @@
 """Values: what the role can be, loads below zero, sensors that stand still, lone or too few readings."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,8 @@ from discovery.recordings.finding import Finding, more
 from discovery.recordings.oddvalues import impossible_readings
 from discovery.recordings.roles import ROLES
 from discovery.recordings.standing import longest_run
+
+CONSTANT = "constant"  # kind of finding: a sensor that never moves in a recording
 
 _NEAR_ZERO = 0.05  # of the largest magnitude of a load or flow: so far below zero is noise
 # what a channel exceeds somewhere in any recording, and the unit that it has where it does not
@@ -86,7 +88,7 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
     if np.ptp(readings) == 0.0:
         what = f"'{channel.name}' is {readings[0]:g} in all {known.size} readings"
         do = "check the sensor; if it is a constant, say so with set = { ... } in the campaign file"
-        yield Finding("warning", file, int(lines[known[0]]), what, do)
+        yield Finding("warning", file, int(lines[known[0]]), what, do, CONSTANT, channel.name)
         return
     run = longest_run(readings)
     if run is not None and (run.stands or run.hung):
@@ -98,6 +100,23 @@ def frozen_findings(file: Path, lines: Lines, channel: Channel, column: Array) -
         yield Finding(
             "warning", file, int(lines[first]), what, "check the sensor; empty the cells if it hung"
         )
+
+
+def said_once(findings: Sequence[Finding], campaign: Path, recordings: int) -> list[Finding]:
+    """Findings with one, of the campaign, where a sensor shows the same value in all recordings.
+
+    Args:
+        recordings: how many there are.
+    """
+    found = list(findings)
+    for channel in {one.channel for one in findings if one.kind == CONSTANT}:
+        alike = [one for one in findings if (one.kind, one.channel) == (CONSTANT, channel)]
+        (said, *others) = {one.what.partition(" in all ")[0] for one in alike}
+        if len(alike) == recordings > 1 and not others:
+            what = f"{said} in all readings of all {recordings} recordings"
+            found = [one for one in found if one not in alike]
+            found.append(Finding("warning", campaign, None, what, alike[0].do, CONSTANT, channel))
+    return found
 
 
 def _every(readings: float) -> str:
@@ -123,4 +142,5 @@ def few_findings(file: Path, channel: Channel, column: Array) -> Iterator[Findin
     count = int(np.isfinite(column).sum())
     if count < FEW:
         what = f"'{channel.name}' has {count or 'no'} reading{'' if count == 1 else 's'}"
-        yield Finding("warning", file, None, what, f"record longer: at least {FEW} readings carry a model")
+        do = f"record longer: at least {FEW} readings carry a model"
+        yield Finding("warning", file, None, what, do if count else "look at the sensor and at its column")

@@ -30,11 +30,11 @@ class Event:
 def instant(time: float) -> str:
     """A time in words.
 
-    >>> instant(1.7e9), instant(5400.0)
-    ('2023-11-14 22:13:20Z', '1.50 h')
+    >>> instant(1.7e9), instant(5400.0), instant(20.0)
+    ('2023-11-14 22:13:20Z', '1.50 h', '20 s')
     """
     if not EPOCH_FROM <= time < 2e11:
-        return f"{time / 3600.0:.2f} h"
+        return f"{time / 3600.0:.2f} h" if abs(time) >= 60.0 else f"{time:.3g} s"
     return datetime.fromtimestamp(time, UTC).strftime("%Y-%m-%d %H:%M:%SZ")
 
 

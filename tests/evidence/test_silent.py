@@ -90,3 +90,5 @@ def test_the_longest_gap_is_said() -> None:
     assert sentences({"a": {"P": unknown, "speed": unknown}, "b": {}}) == [
         "what P, speed did in a from 12 to 13 h is not recorded; the fit allows for it"
     ]
+    short = replace(unknown, time=unknown.time / 3600.0)
+    assert "did in a from 12 to 13 s is not recorded" in sentences({"a": {"P": short}})[0]

@@ -59,7 +59,7 @@ def test_a_meter_of_a_flow_is_noisy_around_zero(write: Write) -> None:
         (with_line(9, "420,20,9e9,"), "error: fit.csv, line 9: 'speed' is 9e+09 rpm, no rotation speed can"),
         (rows(2), "error: fit.csv: only 2 rows; too short for any model"),
         (rows(10), "warning: fit.csv: 'E_Y0C' has 5 readings; record longer"),
-        (with_column(3, [""] * 60), "warning: fit.csv: 'E_Y0C' has no readings; record longer"),
+        (with_column(3, [""] * 60), "warning: fit.csv: 'E_Y0C' has no readings; look at the sensor"),
         (
             with_column(2, [""] * 60),
             "error: fit.csv: the input 'speed' has no value at all; measure it, or say",

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from discovery.printed import lasting, printed
 from discovery.recordings.campaign import Channel
 from discovery.recordings.columns import Array
 from discovery.recordings.compare.seen import Seen, noise_of, rounding_of, smallest_step, warning
@@ -76,9 +77,9 @@ def _scale(recordings: Sequence[Seen], channel: Channel) -> Iterator[Finding]:
             if min(before, after) > least and abs(np.log(after / before)) > abs(np.log(best)):
                 best, where = after / before, int(row)
         if max(best, 1 / best) > _RESCALED and _is_lasting(read, where, rounding):
-            change = f"{best:.2g} times as" if best > 1 else f"1/{1 / best:.2g} as"
-            at = (time[where] - time[0]) / 3600
-            what = f"'{channel.name}' is {change} noisy from about {at:.2g} h on"
+            change = f"{printed(best, 2)} times as" if best > 1 else f"1/{printed(1 / best, 2)} as"
+            at = lasting(float(time[where] - time[0]))
+            what = f"'{channel.name}' is {change} noisy from about {at} on"
             do = "another unit or range from there on: split the recording, or mend it"
             yield warning(one, channel, where, what, do, "halfway", 6.0)
 
