@@ -19,6 +19,7 @@ from discovery.firsthour.measures import dimension_of
 from discovery.firsthour.shapes import Shape, shape
 from discovery.firsthour.unitodds import error_odds
 from discovery.firsthour.vocabulary import PLACES, QUANTITIES, SET_POINT, Word, words_of
+from discovery.recordings.units import UnitError, conversion
 
 Array = NDArray[np.float64]
 
@@ -58,6 +59,7 @@ _ROLES = {
     ("speed", ""): "rotation speed",
 }
 OTHER = "other input"
+_FASTEST_RPM = 1e6  # dental turbines reach half of it
 _STEPS = 255.0  # of a pulse width
 # a word that names a quantity, and one for a thing that usually has some: the current of a load is a current
 _NAMES, _HAS = 5.0, 3.0
@@ -141,6 +143,8 @@ def evidence(
             odds = {**dict.fromkeys((q for q in QUANTITIES if q not in odds), -12.0), **odds}
         found.add(f"its unit {unit}", odds)
     form = shape(values)
+    if form is not None and unit is not None and (turns := _in_rpm(form.high, unit)) > _FASTEST_RPM:
+        found.add(f"up to {turns:.1g} rpm, and nothing turns so fast", {"speed": -24.0})
     if form is not None:
         for why, more in value_odds(form, unit):
             found.add(why, more)
@@ -149,6 +153,18 @@ def evidence(
     for why, more in hints:
         found.add(why, more)
     return found
+
+
+def _in_rpm(value: float, unit: str) -> float:
+    """A value in rpm; zero where its unit is none of a speed.
+
+    >>> round(_in_rpm(50.0, "Hz")), _in_rpm(50.0, "W")
+    (3000, 0.0)
+    """
+    try:
+        return float(conversion(unit, "rotation speed").factor * value)
+    except UnitError:
+        return 0.0
 
 
 def _only_a_place(word: Word) -> bool:

@@ -10,9 +10,9 @@ import numpy as np
 
 from discovery.errors import UserError
 from discovery.firsthour.clocks import bookkeeping, counts_up, tells_time
-from discovery.firsthour.evidence import is_set_point_word
+from discovery.firsthour.evidence import OTHER, is_set_point_word
 from discovery.firsthour.filenames import constants, file_hints
-from discovery.firsthour.guess import TEMPERATURES, Guess, guess
+from discovery.firsthour.guess import SURE, TEMPERATURES, Guess, guess
 from discovery.firsthour.measures import DEGREES, TIME_UNITS, known_unit
 from discovery.firsthour.odds import probabilities
 from discovery.firsthour.stamps import stated_interval
@@ -24,6 +24,8 @@ from discovery.recordings.units import UnitError, conversion
 
 _LAST_THIRD = 2 / 3
 _ELSEWHERE = 30.0  # times what a column moves in a run
+_ALONE = 2.0  # times as far as in any other recording: the last one alone moves a channel
+_ANSWERS = ("error", "other output", "temperature")
 _ELECTRIC = ("current", "voltage")
 _OWN = "time"  # the name that the documents give to a column of seconds
 _KEPT_TO = 2.0  # log odds that who uses this name keeps to its unit, too
@@ -31,11 +33,11 @@ _KEPT_TO = 2.0  # log odds that who uses this name keeps to its unit, too
 
 @dataclass(frozen=True)
 class Recorded:
-    """`recordings`: the last one is unseen. `seen`: each column, its values joined from all others.
+    """`recordings`: the last one is unseen, that of the files or the one before (`_most_moving_first`).
 
-    `guesses`: of each column. `clock`: probabilities of the units in which an undecided clock counts, the
-    likeliest first. `constants`: what the names of the files say, by channel: unit, and value by recording.
-    `notes`: what was left out.
+    `seen`: each column, its values joined from all others. `guesses`: of each column. `clock`: probabilities
+    of the units in which an undecided clock counts, the likeliest first. `constants`: what the names of the
+    files say, by channel: unit, and value by recording. `notes`: what was left out.
     """
 
     recordings: dict[str, OwnTable]
@@ -62,9 +64,11 @@ def recorded(
     """
     recordings = _same_units(_recordings(tables))
     recordings, clock, notes = _counted(recordings, time_unit)
-    names, runs = list(recordings), list(recordings.values())
-    common, left = _common(runs)
+    common, left = _common(list(recordings.values()))
     notes += left
+    if len(tables) > 1:
+        recordings = _most_moving_first(recordings, common)
+    names, runs = list(recordings), list(recordings.values())
     seen = [_joined(column, runs[:-1]) for column in runs[0].columns if column.name in common]
     hints = file_hints({name: recordings[name] for name in names[:-1]})
     guesses = guess_all(seen, hints)
@@ -102,6 +106,26 @@ def recorded(
         },
         tuple(dict.fromkeys(notes)),
     )
+
+
+def _most_moving_first(recordings: dict[str, OwnTable], common: Collection[str]) -> dict[str, OwnTable]:
+    """The recordings with the last one in front where it alone moves what is measured: nothing that is fitted
+    to the others could predict it. The one before is unseen then.
+    """
+    runs = list(recordings.values())
+    every = [_joined(column, runs) for column in runs[0].columns if column.name in common]
+    asked = [name for name, one in guess_all(every).items() if one.role in _ANSWERS]
+    spans = np.array([[max(map(_span, _values(run, name)), default=0.0) for name in asked] for run in runs])
+    moves = spans[-1] > 0
+    if not moves.any() or np.any(_ALONE * spans[:-1, moves].max(axis=0) >= spans[-1, moves]):
+        return recordings
+    *others, last = recordings
+    return {name: recordings[name] for name in (last, *others)}
+
+
+def _span(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if known.size else 0.0
 
 
 def never_moves(column: Column) -> bool:
@@ -265,7 +289,8 @@ def _says_nothing(
     )
     if not (inputs and never_moves(column)):
         return ""
-    return f'never moves in the recordings to fit: left out (to keep it: --is "{column.header}={one.role}")'
+    role = one.role if one.chance >= SURE else OTHER  # a guess is no advice
+    return f'never moves in the recordings to fit: left out (to keep it: --is "{column.header}={role}")'
 
 
 def _named(column: Column) -> str:

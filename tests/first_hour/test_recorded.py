@@ -380,3 +380,25 @@ def test_a_battery_is_told_how_to_get_thermal_masses(tmp_path: Path) -> None:
     cell.write_text("\n".join(["time [s],current [A],voltage [V],T_cell [degC]", *lines]), "utf-8")
     said = CliRunner().invoke(app, ["new", str(tmp_path / "rig"), "--from", str(cell), "--quick"])
     assert 'thermal masses leave out what is none: --is "voltage [V]=other input"' in said.output
+
+
+def test_a_run_that_alone_warms_the_machine_is_fitted(tmp_path: Path) -> None:
+    """An idle run before it says nothing of a load. Nor is the load judged from the idle run."""
+    idle: Row = lambda k: f"{k},{0.1 - k % 3 / 100},{40 + k % 5 / 9},1500016128,{99 - k // 50}"  # noqa: E731
+    stress: Row = lambda k: f"{k},{min(4, k / 9)},{40 + min(k, 30)},{1.5e9 + k % 9 * 1e8},{99 - k // 9}"  # noqa: E731
+    header = "t_s,load1,temp_c,arm_hz,batt_pct"
+    output, rig = _made(tmp_path, header, idle, stress)
+    assert "recordings: fit run1; held out run0" in output
+    assert "0 to 4 taken" in output
+    channels = _campaign(rig)["channels"]
+    assert (channels["arm"]["role"], channels["arm"]["unit"]) == ("other input", "Hz")  # a clock, no spindle
+    (tmp_path / "again").mkdir()
+    output, _ = _made(tmp_path / "again", header, stress, idle)
+    assert "recordings: fit run0; held out run1" in output
+
+
+def test_a_guess_is_no_advice(tmp_path: Path) -> None:
+    """A percentage that never moves is kept as what nobody knows, not as a load that a guess makes of it."""
+    row: Row = lambda k: f"{k},{40 * (k // 9 % 2)},{25 + k % 20 / 9},99"  # noqa: E731
+    output, _ = _made(tmp_path, "time,P,T1,batt_pct", row, row)
+    assert 'to keep it: --is "batt_pct=other input"' in output
