@@ -87,5 +87,5 @@ def test_an_output_that_stands_still_may_move_a_little() -> None:
 def test_a_model_that_runs_away_in_fixed_steps_is_told() -> None:
     """y' = y^2 + 1 is tan(t): no number after pi/2 s, whatever the step."""
     still = {"t": [0.0, 7200.0], "P": [1.0, 1.0]}
-    with pytest.raises(UserError, match=r"diverges after 0\.0 h of recording 'a' with a fixed step of 10 s"):
+    with pytest.raises(UserError, match=r"diverges after 10 s of recording 'a' with a fixed step of 10 s"):
         output_ranges(sums("y**2 + P"), campaign(a=still), ["a"])
