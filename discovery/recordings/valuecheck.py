@@ -109,7 +109,7 @@ def said_once(findings: Sequence[Finding], campaign: Path, recordings: int) -> l
         recordings: how many there are.
     """
     found = list(findings)
-    for channel in {one.channel for one in findings if one.kind == CONSTANT}:
+    for channel in dict.fromkeys(one.channel for one in findings if one.kind == CONSTANT):
         alike = [one for one in findings if (one.kind, one.channel) == (CONSTANT, channel)]
         (said, *others) = {one.what.partition(" in all ")[0] for one in alike}
         if len(alike) == recordings > 1 and not others:
