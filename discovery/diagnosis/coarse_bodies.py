@@ -13,6 +13,7 @@ from discovery.diagnosis import thresholds
 from discovery.diagnosis.context import Context, with_worse
 from discovery.diagnosis.scored import Scored, is_large, under_noise_of
 from discovery.effects.hypothesis import Hypothesis
+from discovery.printed import printed
 from discovery.terms import Name
 from discovery.terms.expression import names
 
@@ -70,15 +71,22 @@ def sentences(answer: Scored) -> list[str]:
         f"{100 * answer.noise.share:.0f} %: something acts at {state} that no effect explains"
         for state, share in coarse_at(answer).items()
     ]
-    return flows + of_heat(answer)
+    return flows + of_its_own(answer)
 
 
-def of_heat(answer: Scored) -> list[str]:
-    """What is said of each body with more heat that nobody records than is usual, and than the others."""
-    return [
+def of_its_own(answer: Scored) -> list[str]:
+    """What is said of each body with more heat that nobody records than is usual, and than the others, and of
+    each output with more slow noise.
+    """
+    heats = [
         f"heat that the model does not give is about {100 * share:.0f} % of what flows at {state}, more than "
         "elsewhere and than in most machines: something acts there that no effect explains"
         for state, share in heated_at(answer).items()
+    ]
+    return heats + [
+        f"{output} changes slowly by about {printed(times)} times its reading noise, the other outputs by "
+        "less: something acts on it that no effect explains"
+        for output, times in slow_at(answer).items()
     ]
 
 
@@ -97,3 +105,14 @@ def heated_at(answer: Scored) -> dict[str, float]:
     above = {state: level for state, level in setting.levels.items() if level > setting.level}
     each = {state: thresholds.FLOOR * level for state, level in above.items()}
     return {state: share for state, share in each.items() if is_large(share)}
+
+
+def slow_at(answer: Scored) -> dict[str, float]:
+    """Slow noise of each output, in reading noises, where it is larger than these and than at the others."""
+    noise = answer.noise
+    each = {
+        name: round(slow / white, 6)
+        for name, slow, white in zip(noise.outputs, noise.slow, noise.white, strict=False)
+    }
+    least = min(each.values(), default=0.0)
+    return {name: times for name, times in each.items() if times > max(1.0, least)}

@@ -363,7 +363,7 @@ def with_change(context: Context, one: Scored, output: str, goal: float = -inf) 
     """The same fit with a slow change of an output, of unknown cause and any size that noise may have; `goal`
     as in `with_force`.
     """
-    changes = unknown_change(output, [size for size in thresholds.SLOW if size >= 1.0])
+    changes = unknown_change(output, [size for size in thresholds.SLOW if size > 1.0])
     named = replace(one, forced=f"a slow change of {output} of unknown cause")
     return _over_noise(context, replace(named, log_odds_force=_odds_of_force(context)), changes, goal)
 

@@ -12,7 +12,7 @@ from functools import cache, partial
 from math import inf, sqrt
 
 from discovery.diagnosis import thresholds
-from discovery.diagnosis.coarse_bodies import of_heat
+from discovery.diagnosis.coarse_bodies import of_its_own
 from discovery.diagnosis.context import Context
 from discovery.diagnosis.crossvalidation import LeftOut, left_out, together_left_out
 from discovery.diagnosis.named import Named, added, claims, one_named
@@ -338,11 +338,11 @@ def unrecorded(found: Search) -> tuple[str, ...]:
 
 
 def coarse(found: Search) -> tuple[str, ...]:
-    """Sentences about a model whose error is larger than usual, everywhere or at a body; else none."""
+    """Sentences about a model whose error is larger than usual, everywhere or at a place; else none."""
     if not found.baseline.coarse:
-        return tuple(of_heat(found.baseline))
+        return tuple(of_its_own(found.baseline))
     return (
         f"the flows of the model are wrong by about {100 * found.baseline.off:.0f} %, more than is usual for "
         "a lumped model, and no effect that is sure explains it",
-        *of_heat(found.baseline),
+        *of_its_own(found.baseline),
     )

@@ -64,6 +64,7 @@ class Model:
     unrecorded: float = thresholds.FLOOR
     wrong: tuple[tuple[str, float], ...] = ()  # bodies whose flows are wrong by more than usual
     heated: tuple[tuple[str, float], ...] = ()  # level of the heat that nobody records, of coarser bodies
+    slow: tuple[tuple[str, float], ...] = ()  # slow noise of outputs, in reading noises
     abrupt: bool = False  # its faults are jumps that no flow makes
 
     @property
@@ -76,7 +77,14 @@ class Model:
 
     @property
     def noise(self) -> Any:
-        return SimpleNamespace(share=0.02, force={state: (0.0, share) for state, share in self.wrong})
+        outputs, slow = zip(*self.slow, strict=True) if self.slow else ((), ())
+        return SimpleNamespace(
+            share=0.02,
+            force={state: (0.0, share) for state, share in self.wrong},
+            outputs=outputs,
+            white=(0.5,) * len(outputs),
+            slow=tuple(0.5 * times for times in slow),
+        )
 
     @property
     def setting(self) -> Any:
@@ -858,6 +866,12 @@ def test_a_name_that_does_nothing_for_free_runs_is_withdrawn() -> None:
     assert jacket.word == "unexplained"
     assert "about 10 % of what flows at jacket" in jacket.reasons[0]
     assert said(Tried([Model((), 0.0, heated=(("jacket", 2.0),))]), {}).word == "no mismatch"
+    # a bridge that bends with the product of two temperatures: noise of its output alone takes it up
+    bridge = said(Tried([Model((), 0.0, slow=(("X", 3.0), ("Z", 0.3)))]), {})
+    assert bridge.word == "unexplained"
+    assert "X changes slowly by about 3 times its reading noise" in bridge.reasons[0]
+    for usual in ((("X", 1.0), ("Z", 0.3)), (("X", 3.0), ("Z", 3.0)), (("X", 3.0),)):
+        assert said(Tried([Model((), 0.0, slow=usual)]), {}).word == "no mismatch"
     far = Tried([Model((FLUID,), 50.0), Model((), 0.0, off=0.24)])
     assert idle(cast(Any, far), named, {"r1": little, "r2": little}).word == "unexplained"
 
