@@ -109,9 +109,7 @@ def test_a_coarse_answer_is_sought_from_another_beginning_too(
     """Heat is 5 more likely than a second mass as the first effect, and a lag 50 less than both."""
     found = Search(dry())
     for word, evidence in (("heat", 105.0), ("mass", 100.0), ("lag", 55.0)):
-        one = SimpleNamespace(
-            hypotheses=(word,), keys=frozenset({word}), evidence=evidence, settings=[coarse], best=0
-        )
+        one = SimpleNamespace(hypotheses=(word,), keys=frozenset({word}), evidence=evidence, setting=coarse)
         found.tried[one.keys] = cast(Scored, one)
     settled: list[str] = []
     monkeypatch.setattr(Search, "grow", lambda self: self)
