@@ -127,8 +127,7 @@ def test_an_effect_of_an_answer_may_be_all_there_is(monkeypatch: pytest.MonkeyPa
         hypotheses=claims,
         keys=frozenset(words),
         evidence=340.0,
-        settings=[False],
-        best=0,
+        setting=False,
         noise=None,
         fit=None,
     )

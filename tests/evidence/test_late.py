@@ -128,13 +128,14 @@ def test_what_may_stand_for_an_unknown_cause_is_said_otherwise(
     monkeypatch.setattr(module.noisy, "sentences", lambda *_: [])
     monkeypatch.setattr(module, "not_offered", lambda *_: [])
     context = SimpleNamespace(unused_readings=[], model=None, scene=None, outliers=(), grids={})
-    monkeypatch.setattr(module, "is_usual", lambda usual: usual)
-    answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)), settings=[True], best=0)
+    monkeypatch.setattr(module, "is_usual", lambda setting: setting.level <= 1.0)
+    usual, large = (SimpleNamespace(level=level, levels={}) for level in (1.0, 10.0))
+    answer = SimpleNamespace(fit=None, noise=Noise(("T",), (0.1,)), setting=usual)
     assert (
         module._reasons(context, SimpleNamespace(word=word, named=(), answer=answer), answer, [], {}, [], [])
         == said
     )
-    much = SimpleNamespace(fit=None, noise=answer.noise, settings=[False], best=0)
+    much = SimpleNamespace(fit=None, noise=answer.noise, setting=large)
     told = module._reasons(context, SimpleNamespace(word=word, named=(), answer=much), much, [], {}, [], [])
     assert told == ["unsure"]
 
