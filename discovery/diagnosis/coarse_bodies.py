@@ -65,7 +65,7 @@ def judging(context: Context, answer: Scored, chosen: Sequence[Hypothesis]) -> l
 
 
 def sentences(answer: Scored) -> list[str]:
-    """What is said of each body that is off by more than the others, and than is usual."""
+    """What is said of each body and each output that is off by more than the others, and than is usual."""
     flows = [
         f"the flows at {state} are wrong by about {100 * share:.0f} %, those elsewhere by "
         f"{100 * answer.noise.share:.0f} %: something acts at {state} that no effect explains"

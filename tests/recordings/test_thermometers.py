@@ -44,7 +44,7 @@ def test_a_faulty_thermometer(damage: Callable[[Array], Array], said: str, write
 
 
 def test_a_thermometer_without_a_reading_in_one_recording(write: Write) -> None:
-    """It is told as such, and the others are compared without it."""
+    """`check` says so, and compares the other recordings without it."""
     rows, measured = recorded(WARM), BODY.replace("other input", "temperature") % ""
     path = write(rows, measured)
     files = {
