@@ -16,14 +16,15 @@ START_SD = 2.0  # um or K: of a start value that was a reading and is a guess no
 
 def at_readings(model: Model, campaign: Campaign, recordings: Sequence[str]) -> Model:
     """An exported model on recordings, with the start of each state at its first reading, as in its fit,
-    where an export guessed it and every recording reads the state.
+    where it is known no better than an export guesses it, and every recording reads the state.
 
     A guess is off in all recordings alike if the machine never begins at the temperature of its room. Taken
     as knowledge, it looks like an offset of the sensor that the guess follows.
     """
     states = dict(model.states)
     for name, output in shown_states(model, model.outputs).items():
-        if states[name].start_sd == START_SD and all(_read(campaign, r, output) for r in recordings):
+        spread = states[name].start_sd or 0.0
+        if spread >= START_SD and all(_read(campaign, r, output) for r in recordings):
             states[name] = replace(states[name], start=None, start_sd=None)
     return replace(model, states=states)
 

@@ -89,6 +89,8 @@ def test_a_start_is_read_where_it_was_guessed_and_read() -> None:
     assert at_readings(at_work.model, campaign, ["busy", "idle"]).states["T"].start is None
     given = replace(at_work.model, states={"T": replace(states["T"], start_sd=0.25 * START_SD)})
     assert at_readings(given, campaign, ["busy", "idle"]).states["T"] == given.states["T"]
+    wider = replace(at_work.model, states={"T": replace(states["T"], start_sd=2.5 * START_SD)})
+    assert at_readings(wider, campaign, ["busy", "idle"]).states["T"].start is None
     silent = replace(campaign.recordings["idle"], values={"P": np.zeros(120), "T": np.full(120, np.nan)})
     partly = replace(campaign, recordings={**campaign.recordings, "idle": silent})
     assert at_readings(at_work.model, partly, ["busy", "idle"]).states["T"] == states["T"]
